@@ -1,0 +1,41 @@
+"""Errors that a user can cause, each with a message that names the valid choices.
+
+Everything here derives from :class:`ErIlError`, which the command line prints as one line with
+exit code 2. Anything else is a bug and keeps its traceback.
+"""
+
+from collections.abc import Iterable
+
+
+class ErIlError(Exception):
+    """Base of every error that a user's input can cause."""
+
+
+class UnknownNameError(ErIlError):
+    """A name that is not among the valid ones."""
+
+    def __init__(self, kind: str, name: object, choices: Iterable[str]) -> None:
+        super().__init__(f"Unknown {kind} {str(name)!r}. Valid: {', '.join(choices) or 'none'}.")
+
+
+class ArmError(ErIlError):
+    """A URDF that does not describe the arm that was asked for."""
+
+
+class ShapeError(ErIlError, ValueError):
+    """An array of the wrong shape; says the shape it got against the one it needs."""
+
+    def __init__(self, what: str, got: tuple[int, ...], expected: str) -> None:
+        super().__init__(f"{what} has shape {got}, expected {expected}.")
+
+
+class SpecError(ErIlError):
+    """An action specification that is unreadable or does not match."""
+
+
+class DatasetError(ErIlError):
+    """A dataset that is missing, unreadable or not what the command needs."""
+
+
+class PolicyError(ErIlError):
+    """A policy that is missing or was trained for another action space, arm or frame."""

@@ -1,0 +1,92 @@
+"""The action spaces: joint, task and the paper's redundancy-aware ER family."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from er_il.arm import Arm, Vector
+from er_il.errors import ArmError, SpecError, UnknownNameError
+from er_il.kinematics import kinematics_of
+from er_il.rotation import Quaternion, RotationCode, make_rotation
+from er_il.spaces.base import SPEC_VERSION, ActionSpace, Decoded
+from er_il.spaces.erj import ErjSpace
+from er_il.spaces.joint import JointSpace
+from er_il.spaces.task import TaskSpace
+
+__all__ = ["SPACES", "ActionSpace", "Decoded", "from_spec", "make_action_space"]
+
+
+def _joint(arm: Arm, rotation: RotationCode, posture: Vector | None) -> ActionSpace:
+    return JointSpace(arm)
+
+
+def _task(arm: Arm, rotation: RotationCode, posture: Vector | None) -> ActionSpace:
+    return TaskSpace(arm, rotation, posture)
+
+
+def _erj(arm: Arm, rotation: RotationCode, posture: Vector | None) -> ActionSpace:
+    if arm.redundancy == 0:
+        raise ArmError(
+            f"{arm.name} has {arm.dof} joints and so no redundancy: an end-effector pose already fixes them. "
+            "Use joint or task."
+        )
+    return ErjSpace(arm, rotation)
+
+
+SPACES: dict[str, Callable[[Arm, RotationCode, Vector | None], ActionSpace]] = {
+    "joint": _joint,
+    "task": _task,
+    "erj": _erj,
+}
+
+
+def make_action_space(kind: str, arm: Arm, *, rotation: str = "quat", posture: Vector | None = None) -> ActionSpace:
+    """Build an absolute action space by name.
+
+    Args:
+        kind: ``joint``, ``task`` or ``erj``.
+        arm: The arm it commands.
+        rotation: ``quat`` or ``rot6d``; the quaternion's hemisphere is that of the arm's home pose.
+        posture: (n,) [rad] null-space posture for ``task``; without it IK stays near the seed.
+
+    Raises:
+        UnknownNameError: unknown kind or rotation.
+        ArmError: an ER space for an arm without redundancy.
+    """
+    if kind not in SPACES:
+        raise UnknownNameError("action space", kind, SPACES)
+    code = make_rotation(rotation, kinematics_of(arm).fk(arm.home)[:3, :3])
+    return SPACES[kind](arm, code, posture)
+
+
+def from_spec(spec: Mapping[str, Any], arm: Arm | None = None, *, posture: Vector | None = None) -> ActionSpace:
+    """Rebuild the space that :meth:`ActionSpace.spec` described.
+
+    Args:
+        spec: The specification, as read from a dataset's ``features["action"]["info"]["er_il"]``.
+        arm: The arm, for arms that are no preset.
+        posture: See :func:`make_action_space`.
+
+    Raises:
+        SpecError: the specification is of another version, incomplete, or of another arm.
+    """
+    if spec.get("version") != SPEC_VERSION:
+        raise SpecError(f"Action spec has version {spec.get('version')!r}; this er_il reads {SPEC_VERSION}.")
+    try:
+        described, kind = spec["arm"], spec["space"]
+        arm = arm if arm is not None else Arm.preset(described["name"])
+        rotation: RotationCode = make_rotation(
+            spec.get("rotation", Quaternion.kind), kinematics_of(arm).fk(arm.home)[:3, :3]
+        )
+        if "hemisphere" in spec:
+            rotation = Quaternion(tuple(spec["hemisphere"]))
+        if kind not in SPACES:
+            raise UnknownNameError("action space", kind, SPACES)
+        space = SPACES[kind](arm, rotation, posture)
+        expected = {key: described[key] for key in ("joints", "base_frame", "ee_frame", "redundant", "fingerprint")}
+    except KeyError as error:
+        raise SpecError(f"Action spec has no {error}.") from error
+    actual = space.spec()["arm"]
+    for key, value in expected.items():
+        if actual[key] != value:
+            raise SpecError(f"The action spec is for {key} {value}, but the arm {arm.name!r} has {actual[key]}.")
+    return space

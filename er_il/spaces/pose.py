@@ -1,0 +1,59 @@
+"""What task space and the ER spaces share: an end-effector pose, then the redundancy, if any."""
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from er_il.arm import Vector
+from er_il.kinematics import IkResult, Status
+from er_il.rotation import Quaternion, RotationCode, RotationError
+from er_il.spaces.base import ActionSpace, Array, Decoded
+
+POSITION_NAMES = ("ee.x", "ee.y", "ee.z")
+
+
+@dataclass(frozen=True, eq=False)
+class PoseSpace(ActionSpace):
+    """Position [m] and rotation of the end effector in the base frame, then redundancy values [rad]."""
+
+    rotation: RotationCode
+
+    @property
+    @abstractmethod
+    def redundancy_names(self) -> tuple[str, ...]:
+        """Names of the redundancy values."""
+
+    @abstractmethod
+    def redundancy(self, q: Array) -> Array:
+        """Redundancy values (N, len(redundancy_names)) along a trajectory q (N, n) [rad]."""
+
+    @abstractmethod
+    def solve(self, T_base_ee: Array, redundancy: Vector, seed: Vector) -> IkResult:
+        """Find joint angles with that pose (4, 4) and those redundancy values, near the seed (n,)."""
+
+    @property
+    def arm_names(self) -> tuple[str, ...]:
+        return (*POSITION_NAMES, *self.rotation.names, *self.redundancy_names)
+
+    def _encode_arm(self, q: Array) -> Array:
+        T_base_ee = self.kinematics.fk_batch(q)
+        return np.column_stack([T_base_ee[:, :3, 3], self.rotation.encode(T_base_ee[:, :3, :3]), self.redundancy(q)])
+
+    def _decode_arm(self, action: Vector, seed: Vector) -> Decoded:
+        split = len(POSITION_NAMES) + len(self.rotation.names)
+        T_base_ee = np.eye(4)
+        T_base_ee[:3, 3] = action[:3]
+        try:
+            T_base_ee[:3, :3] = self.rotation.decode(action[3:split])
+        except RotationError:
+            return Decoded(seed, 0.0, Status.INVALID)
+        ik = self.solve(T_base_ee, action[split:], seed)
+        return Decoded(ik.q, 0.0, ik.status, ik.pos_err, ik.rot_err, ik.iters)
+
+    def _details(self) -> dict[str, Any]:
+        details: dict[str, Any] = {"rotation": self.rotation.kind}
+        if isinstance(self.rotation, Quaternion):
+            details["hemisphere"] = list(self.rotation.reference)
+        return details

@@ -1,0 +1,1 @@
+"""MuJoCo tasks for a redundant arm, as Gymnasium environments."""
