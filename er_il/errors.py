@@ -39,3 +39,7 @@ class DatasetError(ErIlError):
 
 class PolicyError(ErIlError):
     """A policy that is missing or was trained for another action space, arm or frame."""
+
+
+class PlanError(ErIlError):
+    """No collision-free motion exists for the scripted leader; the demo is dropped and counted."""
