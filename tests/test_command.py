@@ -1,0 +1,123 @@
+import numpy as np
+import pytest
+
+from er_il import Arm, Status, make_action_space
+from er_il.command import Commander
+from er_il.errors import ErIlError, UnknownNameError
+
+PANDA = Arm.preset("panda")
+PERIOD = 0.05
+REACH = PANDA.velocity * PERIOD
+
+
+def commander(kind: str = "joint", on_invalid: str = "best_effort") -> Commander:
+    made = Commander(make_action_space(kind, PANDA), PERIOD, on_invalid)
+    made.reset(PANDA.home, gripper=0.4)
+    return made
+
+
+def test_a_valid_action_within_reach_is_followed_exactly():
+    erj = commander("erj")
+    goal = PANDA.home + 0.4 * REACH
+    command = erj.command(erj.space.encode(goal, 0.7), PANDA.home)
+    assert command.status is Status.OK
+    np.testing.assert_allclose(command.q, goal, atol=1e-3)
+    assert command.gripper == pytest.approx(0.7)
+
+
+def test_the_velocity_limit_holds_between_successive_commands_and_keeps_the_direction():
+    joint = commander()
+    goal = PANDA.home + np.array([4.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0]) * REACH
+    first = joint.command(joint.space.encode(goal), PANDA.home)
+    np.testing.assert_allclose(first.q - PANDA.home, (goal - PANDA.home) / 4)
+    # The measured joints lag behind: the limit counts from the last command all the same.
+    second = joint.command(joint.space.encode(goal), PANDA.home)
+    np.testing.assert_allclose(second.q - first.q, (goal - PANDA.home) / 4)
+    assert first.joint_step == pytest.approx(4 * REACH[0])
+
+
+@pytest.mark.parametrize("kind", ["joint", "task", "erj"])
+@pytest.mark.parametrize("on_invalid", ["best_effort", "hold", "stop"])
+def test_whatever_the_policy_says_the_command_is_safe(kind: str, on_invalid: str):
+    made = commander(kind, on_invalid)
+    rng = np.random.default_rng(0)
+    last, q = PANDA.home, PANDA.home
+    for step in range(60):
+        action = rng.normal(scale=10.0 ** rng.integers(-3, 6), size=made.space.dim)
+        if step % 7 == 0:
+            action[rng.integers(made.space.dim)] = rng.choice([np.nan, np.inf, -np.inf])
+        if step % 11 == 0:
+            action[:] = 0.0
+        command = made.command(action, q)
+        assert np.all(np.isfinite(command.q)) and 0.0 <= command.gripper <= 1.0
+        assert np.all(command.q >= PANDA.lower) and np.all(command.q <= PANDA.upper)
+        assert np.all(np.abs(command.q - last) <= REACH + 1e-9)
+        last, q = command.q, command.q
+    assert made.tally.statuses.total() == len(made.tally.latencies) == 60
+    assert made.tally.invalid > 0
+
+
+def test_an_action_that_means_nothing_moves_neither_arm_nor_gripper():
+    task = commander("task")
+    sagging = PANDA.home + 0.01
+    for action in (np.full(8, np.nan), np.array([0.5, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 1.0])):  # a zero quaternion
+        command = task.command(action, sagging)
+        assert command.status is Status.INVALID
+        np.testing.assert_array_equal(command.q, PANDA.home)
+        assert command.gripper == pytest.approx(0.4)
+
+
+def test_lost_measurements_hold_the_arm():
+    joint = commander()
+    command = joint.command(joint.space.encode(PANDA.home + 0.01), np.full(7, np.nan))
+    assert command.status is Status.INVALID
+    np.testing.assert_array_equal(command.q, PANDA.home)
+
+
+def far_away() -> np.ndarray:
+    return PANDA.home + np.array([0.0, 0.0, 6.0, 0.0, 0.0, 0.0, 0.0]) * REACH
+
+
+def test_a_solution_on_another_branch_is_a_jump():
+    joint = commander()
+    assert joint.command(joint.space.encode(far_away()), PANDA.home).status is Status.JUMP
+    near = PANDA.home + 4.9 * REACH
+    assert joint.command(joint.space.encode(near), PANDA.home).status is Status.OK
+
+
+def test_best_effort_approaches_hold_waits_and_stop_stays():
+    best, hold, stop = commander(), commander(on_invalid="hold"), commander(on_invalid="stop")
+    jump, fine = best.space.encode(far_away(), 0.0), best.space.encode(PANDA.home + 0.5 * REACH, 0.0)
+    assert best.command(jump, PANDA.home).q[2] == pytest.approx(PANDA.home[2] + REACH[2])
+    np.testing.assert_array_equal(hold.command(jump, PANDA.home).q, PANDA.home)
+    np.testing.assert_allclose(hold.command(fine, PANDA.home).q, PANDA.home + 0.5 * REACH)
+    assert stop.command(fine, PANDA.home).stopped is False
+    for action in (jump, fine):
+        command = stop.command(action, PANDA.home)
+        assert command.stopped
+        np.testing.assert_allclose(command.q, PANDA.home + 0.5 * REACH)
+    stop.reset(PANDA.home)
+    assert not stop.command(fine, PANDA.home).stopped
+    assert stop.tally.invalid == 0
+
+
+def test_an_unreachable_target_is_counted_and_answered_in_bounded_steps():
+    task = commander("task")
+    q = PANDA.home
+    away = task.space.encode(PANDA.home)
+    away[:3] = [3.0, 0.0, 0.5]
+    for _ in range(40):
+        command = task.command(away, q)
+        assert np.all(np.abs(command.q - q) <= REACH + 1e-9)
+        q = command.q
+    assert task.tally.invalid == 40
+
+
+def test_mistakes_name_the_choices():
+    space = make_action_space("joint", PANDA)
+    with pytest.raises(UnknownNameError, match="best_effort, hold, stop"):
+        Commander(space, PERIOD, "panic")
+    with pytest.raises(ErIlError, match="positive"):
+        Commander(space, 0.0)
+    with pytest.raises(ErIlError, match="not finite"):
+        Commander(space, PERIOD).reset(np.full(7, np.nan))
