@@ -1,1 +1,16 @@
-"""MuJoCo tasks for a redundant arm, as Gymnasium environments."""
+"""MuJoCo tasks for a redundant arm, as Gymnasium environments ``sim_tasks/<Task>-v0``."""
+
+import gymnasium
+
+from sim_tasks.arm_task import ArmTask
+from sim_tasks.lift_cup import LiftCup
+from sim_tasks.reach_cup import ReachCup
+
+TASKS: tuple[type[ArmTask], ...] = (ReachCup, LiftCup)
+
+for _task in TASKS:
+    gymnasium.register(
+        f"sim_tasks/{_task.__name__}-v0",
+        entry_point=f"{_task.__module__}:{_task.__name__}",
+        max_episode_steps=_task.max_steps,
+    )

@@ -1,0 +1,123 @@
+"""What the cup tasks share: a goblet to take by its stem."""
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from sim_tasks.arm_task import ArmTask, Placement
+from sim_tasks.collision import Collisions
+from sim_tasks.contact import touching
+from sim_tasks.motion import Keyframe, Stretch, plan_stretch
+from sim_tasks.props import Goblet
+from sim_tasks.scene import scene_spec
+
+CUP = "cup"
+GRASP_HEIGHT = 0.09  # [m] of the fingertips above the surface the cup stands on, at mid-stem
+PITCH = np.radians(20)  # of the hand below the horizontal
+FREED = 0.01  # [m] of the foot above the surface
+TIPPED = np.cos(np.radians(25))  # cosine of the tilt from which a stemmed cup falls
+CLOSED = 0.5  # opening below which the gripper counts as closed
+CLEARANCE = 0.008  # [m] the leader keeps from the furniture
+GRASP_TIME = 0.5  # [s] for the fingers to close
+
+
+class CupTask(ArmTask):
+    """Reach the cup, grasp its thin stem and lift it free."""
+
+    objects = (CUP,)
+    cup = Goblet()
+    surface: float  # z [m] on which the cup stands
+    centre: tuple[float, float]  # x, y [m] of the cup's mean place
+    via: tuple[float, float, float]  # [m] where the hand turns towards the cup, relative to the grasp
+    elbow: float  # [rad] base joint that keeps the elbow up on the way
+
+    def __init__(
+        self,
+        *,
+        cup_range: tuple[float, float] = (0.03, 0.03),
+        via_range: float = 0.01,
+        speed_range: tuple[float, float] = (0.30, 0.38),
+        **kwargs: Any,
+    ) -> None:
+        """Build the task.
+
+        Args:
+            cup_range: Sides [m] of the rectangle in which the cup stands.
+            via_range: The leader's hand enters up to this far [m] from the nominal place.
+            speed_range: The leader's share of the joints' velocity limits.
+            kwargs: See :class:`ArmTask`.
+        """
+        self._cup_range = cup_range
+        self._via_range = via_range
+        self._speed_range = speed_range
+        super().__init__(**kwargs)
+        self._cup_body = {self._model.body(CUP).id}
+        self._was_freed = False
+
+    def _draw(self, rng: np.random.Generator) -> Placement:
+        x, y = np.array(self.centre) + (rng.random(2) - 0.5) * self._cup_range
+        return {CUP: (x, y, 0.0)}
+
+    def _place(self, placement: Placement) -> None:
+        x, y, yaw = placement[CUP]
+        self._data.joint(CUP).qpos = (x, y, self.surface, np.cos(yaw / 2), 0, 0, np.sin(yaw / 2))
+        self._was_freed = False
+
+    def _held(self) -> bool:
+        return all(touching(self._model, self._data, {finger}, self._cup_body) for finger in self._fingers)
+
+    def _freed(self) -> bool:
+        return bool(self.object_pose(CUP)[2] > self.surface + FREED)
+
+    def _upright(self) -> bool:
+        return bool(self._data.body(CUP).xmat[8] > TIPPED)  # the cup's own z axis against the world's
+
+    def _succeeds(self) -> bool:
+        return self._held() and self._freed() and self._upright()
+
+    def _fails(self) -> str:
+        self._was_freed |= self._held() and self._freed()
+        if not self._upright() or self.object_pose(CUP)[2] < self.surface - FREED:
+            return "dropped" if self._was_freed else "knocked_over"
+        return ""
+
+    def _times_out(self) -> str:
+        return "missed_grasp" if self.gripper_opening < CLOSED and not self._held() else "timeout"
+
+    def _hand(self, position: Sequence[float]) -> np.ndarray:
+        """T_base_ee (4, 4) of a hand that points forward and down, the fingers level."""
+        approach = np.array([np.cos(PITCH), 0.0, -np.sin(PITCH)])
+        level = np.array([0.0, 1.0, 0.0])
+        T = np.eye(4)
+        T[:3, :3] = np.column_stack([np.cross(level, approach), level, approach])
+        T[:3, 3] = position
+        return T
+
+    @cached_property
+    def _collisions(self) -> Collisions:
+        spec = scene_spec(self.arm)
+        self._build(spec)
+        return Collisions(spec, self.arm, self.obstacles, CLEARANCE)
+
+    def _script(self, rng: np.random.Generator) -> tuple[Sequence[Stretch], float]:
+        x, y = self.object_pose(CUP)[:2]
+        grasp = np.array([x, y, self.surface + GRASP_HEIGHT])
+        enter = grasp + self.via + rng.uniform(-self._via_range, self._via_range, 3)
+        before = grasp + (-0.10, 0.0, 0.005)
+        lifted = grasp + (-0.03, 0.0, 0.022)
+        approach = [
+            Keyframe(self._hand(enter), self.elbow),
+            Keyframe(self._hand(before), self.elbow, straight=True),
+            Keyframe(self._hand(grasp), self.elbow, straight=True),
+        ]
+        is_free = self._collisions.is_free
+        reach = plan_stretch(self.arm, self.joint_positions, approach, is_free)
+        lift = plan_stretch(self.arm, reach[-1], [Keyframe(self._hand(lifted), self.elbow, straight=True)], is_free)
+        script = [
+            Stretch(reach, gripper=1.0),
+            Stretch(reach[-1:], gripper=0.0, hold=GRASP_TIME),
+            Stretch(lift, gripper=0.0, hold=0.5),
+        ]
+        return script, rng.uniform(*self._speed_range)

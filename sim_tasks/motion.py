@@ -1,0 +1,106 @@
+"""From keyframes to a motion: collision-checked IK with a chosen elbow, then smooth timing."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+from scipy.spatial.transform import Rotation, Slerp
+
+from er_il.arm import Arm, Vector
+from er_il.errors import PlanError
+from er_il.kinematics import Status, kinematics_of
+
+STRAIGHT_STEP = 0.02  # [m] spacing of the waypoints of a straight stretch
+CHECK_STEP = 0.05  # [rad] spacing of collision checks
+ELBOW_SEARCH = np.linspace(0.0, 0.6, 13)  # [rad] how far the elbow may leave its wish to be free
+PEAK_OF_EASING = 15 / 8  # highest speed of the minimum-jerk profile over its mean speed
+
+
+@dataclass(frozen=True)
+class Keyframe:
+    """A pose for the hand on the way, with the elbow that should take it there."""
+
+    T_base_ee: np.ndarray  # (4, 4)
+    elbow: float  # [rad] wished angle of the arm's first redundant joint
+    straight: bool = False  # the hand moves here on a straight line
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A motion between two stops, the gripper still."""
+
+    waypoints: np.ndarray  # (K, n) [rad]
+    gripper: float  # opening in [0, 1]
+    hold: float = 0.0  # [s] rest at the end, for the gripper to act
+
+    def sample(self, arm: Arm, period: float, speed: float) -> np.ndarray:
+        """Joint angles (T, n) every ``period`` seconds at a share ``speed`` of the velocity limits."""
+        waypoints = self.waypoints
+        still = np.tile(waypoints[-1], (round(self.hold / period), 1))
+        if len(waypoints) < 2:
+            return still
+        knots = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(waypoints, axis=0), axis=1))])
+        curve = PchipInterpolator(knots / knots[-1], waypoints)
+        slope = np.max(np.abs(curve(np.linspace(0, 1, 200), 1)) / arm.velocity)
+        steps = max(2, int(np.ceil(slope * PEAK_OF_EASING / speed / period)))
+        t = np.arange(1, steps + 1) / steps
+        return np.concatenate([curve(t**3 * (10 - 15 * t + 6 * t**2)), still])
+
+
+def solve_keyframe(arm: Arm, keyframe: Keyframe, seed: Vector, is_free: Callable[[Vector], bool]) -> Vector:
+    """Return joint angles (n,) that reach a keyframe free of collision, the elbow as near its wish as can be.
+
+    Raises:
+        PlanError: no elbow within the search range is reachable and free.
+    """
+    joint = arm.redundant[0]
+    for offset in ELBOW_SEARCH:
+        for elbow in {keyframe.elbow + offset, keyframe.elbow - offset}:
+            ik = kinematics_of(arm).solve(keyframe.T_base_ee, seed, fixed={joint: elbow})
+            if ik.status is Status.OK and is_free(ik.q):
+                return ik.q
+    x, y, z = keyframe.T_base_ee[:3, 3]
+    raise PlanError(
+        f"No collision-free elbow near {keyframe.elbow:.2f} rad for the hand at ({x:.2f}, {y:.2f}, {z:.2f})."
+    )
+
+
+def plan_stretch(
+    arm: Arm, start: Vector, keyframes: Sequence[Keyframe], is_free: Callable[[Vector], bool]
+) -> np.ndarray:
+    """Return waypoints (K, n) from a start through keyframes, checked for collision all along.
+
+    Raises:
+        PlanError: a keyframe cannot be reached, or the way to it is blocked.
+    """
+    waypoints = [np.asarray(start)]
+    for keyframe in keyframes:
+        goal = solve_keyframe(arm, keyframe, waypoints[-1], is_free)
+        waypoints += _straight(arm, waypoints[-1], goal, keyframe) if keyframe.straight else [goal]
+    path = np.array(waypoints)
+    for one, other in zip(path, path[1:], strict=False):
+        for t in np.linspace(0, 1, max(2, int(np.max(np.abs(other - one)) / CHECK_STEP) + 1)):
+            if not is_free((1 - t) * one + t * other):
+                raise PlanError("The way between two keyframes is blocked.")
+    return path
+
+
+def _straight(arm: Arm, start: Vector, goal: Vector, keyframe: Keyframe) -> list[Vector]:
+    """Waypoints after the start along a straight line of the hand, the elbow turning evenly."""
+    kinematics, joint = kinematics_of(arm), arm.redundant[0]
+    T_start, T_goal = kinematics.fk(start), keyframe.T_base_ee
+    steps = max(1, int(np.ceil(np.linalg.norm(T_goal[:3, 3] - T_start[:3, 3]) / STRAIGHT_STEP)))
+    turn = Slerp([0, 1], Rotation.from_matrix([T_start[:3, :3], T_goal[:3, :3]]))
+    elbow = arm.joints.index(joint)
+    waypoints = [start]
+    for t in np.arange(1, steps + 1) / steps:
+        T = np.eye(4)
+        T[:3, :3] = turn(t).as_matrix()
+        T[:3, 3] = (1 - t) * T_start[:3, 3] + t * T_goal[:3, 3]
+        angle = (1 - t) * start[elbow] + t * goal[elbow]
+        ik = kinematics.solve(T, waypoints[-1], fixed={joint: angle})
+        if ik.status is not Status.OK:
+            raise PlanError("The hand cannot follow the straight line to a keyframe.")
+        waypoints.append(ik.q)
+    return waypoints[1:]

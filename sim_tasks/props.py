@@ -1,0 +1,129 @@
+"""Things in the worlds: each function adds one to a spec, sized in metres, standing at its frame's origin."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+BOX, CYLINDER, CAPSULE, MESH = (
+    mujoco.mjtGeom.mjGEOM_BOX,
+    mujoco.mjtGeom.mjGEOM_CYLINDER,
+    mujoco.mjtGeom.mjGEOM_CAPSULE,
+    mujoco.mjtGeom.mjGEOM_MESH,
+)
+
+
+@dataclass(frozen=True)
+class Goblet:
+    """A cup on a thin stem. Heights [m] above the surface it stands on."""
+
+    foot_radius: float = 0.036
+    foot_height: float = 0.006
+    stem_radius: float = 0.005
+    stem_top: float = 0.140
+    bowl_radius: float = 0.034
+    height: float = 0.200
+    mass: float = 0.12  # [kg]
+
+    def add(self, spec: mujoco.MjSpec, name: str, position: Sequence[float], material: str) -> mujoco.MjsBody:
+        """Add the cup as a free body whose origin is the middle of its foot's underside."""
+        body = spec.worldbody.add_body(name=name, pos=position)
+        body.add_freejoint(name=name)
+        mesh = spec.add_mesh(name=name, inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL)
+        vertices, faces = _lathe(self._profile())
+        mesh.uservert, mesh.userface = vertices.ravel(), faces.ravel()
+        body.add_geom(type=MESH, meshname=name, material=material, contype=0, conaffinity=0, mass=0, group=2)
+        stem = (self.stem_top - self.foot_height) / 2
+        bowl = (self.height - self.stem_top) / 2
+        # Most of the mass sits in the foot, as in a real stemmed cup: it stands by itself.
+        shapes = (
+            (self.foot_radius, self.foot_height / 2, self.foot_height / 2, 0.6),
+            (self.stem_radius, stem, self.foot_height + stem, 0.1),
+            (self.bowl_radius, bowl, self.stem_top + bowl, 0.3),
+        )
+        for radius, half_height, centre, share in shapes:
+            body.add_geom(
+                type=CYLINDER,
+                size=(radius, half_height, 0),
+                pos=(0, 0, centre),
+                mass=share * self.mass,
+                friction=(1.0, 0.02, 0.0005),
+                condim=4,
+                group=3,
+            )
+        return body
+
+    def _profile(self) -> np.ndarray:
+        """(K, 2) radius and height along the outline, from the foot up, over the rim and down inside."""
+        foot = [(0, 0), (self.foot_radius, 0), (self.foot_radius, self.foot_height * 0.6)]
+        flare = [(self.foot_radius * 0.45, self.foot_height), (self.stem_radius, self.foot_height * 3)]
+        neck = [(self.stem_radius, self.stem_top - 0.012), (self.stem_radius * 2, self.stem_top)]
+        t = np.linspace(0, np.pi / 2, 9)[1:]
+        depth = self.height - self.stem_top
+        outer = [(self.bowl_radius * np.sin(a), self.stem_top + depth * (1 - np.cos(a))) for a in t if np.sin(a) > 0.35]
+        wall = 0.0025
+        inner = [(max(r - wall, 0.0), z + wall * (z < self.height)) for r, z in reversed(outer)]
+        return np.array([*foot, *flare, *neck, *outer, *inner, (0, self.stem_top + wall)])
+
+
+@dataclass(frozen=True)
+class Cabinet:
+    """A cupboard with one open compartment; its front faces the robot (-x)."""
+
+    front: float = 0.42  # x of the opening
+    depth: float = 0.40
+    inner_width: float = 0.30
+    floor: float = 0.50  # z of the compartment's floor
+    ceiling: float = 0.76
+    wall: float = 0.018
+
+    def add(self, spec: mujoco.MjSpec, name: str, material: str, inside: str) -> mujoco.MjsBody:
+        """Add the cabinet, fixed to the world."""
+        body = spec.worldbody.add_body(name=name)
+        half_depth, half_width, t = self.depth / 2, self.inner_width / 2 + self.wall, self.wall / 2
+        x = self.front + half_depth
+        middle, half_height = (self.floor + self.ceiling) / 2, (self.ceiling - self.floor) / 2
+        boards = {
+            "base": ((half_depth, half_width, self.floor / 2 - t), (x, 0, self.floor / 2 - t), material),
+            "floor": ((half_depth, half_width, t), (x, 0, self.floor - t), material),
+            "ceiling": ((half_depth, half_width, t), (x, 0, self.ceiling + t), material),
+            "left": ((half_depth, t, half_height), (x, half_width - t, middle), material),
+            "right": ((half_depth, t, half_height), (x, -half_width + t, middle), material),
+            "back": ((t, half_width - 2 * t, half_height), (x + half_depth - t, 0, middle), inside),
+        }
+        for board, (size, position, look) in boards.items():
+            body.add_geom(name=f"{name}_{board}", type=BOX, size=size, pos=position, material=look)
+        return body
+
+
+@dataclass(frozen=True)
+class Stand:
+    """A table on one column."""
+
+    centre: tuple[float, float] = (0.72, 0.0)
+    height: float = 0.50
+    size: tuple[float, float] = (0.24, 0.30)
+
+    def add(self, spec: mujoco.MjSpec, name: str, material: str) -> mujoco.MjsBody:
+        """Add the stand, fixed to the world."""
+        body = spec.worldbody.add_body(name=name, pos=(*self.centre, 0.0))
+        t = 0.01
+        top = (self.size[0] / 2, self.size[1] / 2, t)
+        column = (0.03, self.height / 2 - t, 0)
+        body.add_geom(name=f"{name}_top", type=BOX, size=top, pos=(0, 0, self.height - t), material=material)
+        body.add_geom(name=f"{name}_column", type=CYLINDER, size=column, pos=(0, 0, column[1]), material=material)
+        return body
+
+
+def _lathe(profile: np.ndarray, segments: int = 36) -> tuple[np.ndarray, np.ndarray]:
+    """Turn an outline (K, 2) of radius and height into a surface: vertices (V, 3), faces (F, 3)."""
+    angle = np.linspace(0, 2 * np.pi, segments, endpoint=False)
+    ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    vertices = np.concatenate([np.column_stack([radius * ring, np.full(segments, z)]) for radius, z in profile])
+    faces = []
+    for k in range(len(profile) - 1):
+        for i in range(segments):
+            a, b = k * segments + i, k * segments + (i + 1) % segments
+            faces += [(a, b, a + segments), (b, b + segments, a + segments)]
+    return vertices, np.array(faces)
