@@ -11,7 +11,9 @@ from er_il.errors import ErIlError
 
 # Command -> module under er_il.cli that holds a function of the command's name. Their heavy
 # imports (torch, MuJoCo, Rerun) wait inside the functions, so that help is instant.
-COMMANDS: dict[str, str] = {}
+COMMANDS: dict[str, str] = {
+    "generate": "generate",
+}
 
 USER_MISTAKE = 2  # exit code, as for unknown options
 INTERRUPTED = 130

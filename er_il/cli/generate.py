@@ -1,0 +1,62 @@
+"""``er-il generate``: record demonstrations as LeRobot datasets."""
+
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional, arg
+
+
+def generate(
+    task: Positional[str],
+    *,
+    spaces: str = "joint,task,erj",
+    episodes: int | None = None,
+    seed: int | None = None,
+    cameras: Annotated[str | None, arg(metavar="NAME,NAME")] = None,
+    size: int | None = None,
+    out: Path | None = None,
+    workers: int | None = None,
+) -> None:
+    """Record demonstrations of a task and write one LeRobot dataset a space.
+
+    What is not given comes from the task's recipe. Interrupted, the same command resumes.
+
+    Args:
+        task: Task, such as reach_cup.
+        spaces: Action spaces, separated by commas; they name the datasets' folders.
+        episodes: Number of demonstrations.
+        seed: Seed of the demonstrations.
+        cameras: Cameras to record, separated by commas, such as wrist,shoulder.
+        size: Width and height of the cameras' images [px].
+        out: Folder of the datasets; datasets/<task> if omitted.
+        workers: Worker processes; one a core if omitted.
+    """
+    from rich.console import Console
+
+    from er_il.cli.progress import make_progress
+    from er_il.recipe import Recipe
+    from er_il.recording import generate as generate_datasets
+    from er_il.workers import cores
+
+    recipe = Recipe.load(task)
+    if episodes is not None:
+        recipe = recipe.resized(episodes)
+    given = {"seed": seed, "cameras": _split(cameras), "image_size": size}
+    recipe = replace(recipe, **{key: value for key, value in given.items() if value is not None})
+    folder = out if out is not None else Path("datasets") / task
+    console = Console()
+    with make_progress(console) as progress:
+        generated = generate_datasets(recipe, _split(spaces) or (), folder, progress, workers or cores())
+    for space, path in generated.paths.items():
+        console.print(f"{path}: {'written' if space in generated.new else 'was there already'}", highlight=False)
+    reasons = Counter(generated.dropped.values())
+    dropped = ", ".join(f"{reason} {count}" for reason, count in reasons.most_common())
+    console.print(
+        f"{recipe.episodes} demonstrations, {len(generated.dropped)} dropped{f' ({dropped})' * bool(dropped)}."
+    )
+
+
+def _split(names: str | None) -> tuple[str, ...] | None:
+    return None if names is None else tuple(name.strip() for name in names.split(",") if name.strip())
