@@ -1,1 +1,3 @@
 """LeRobot finds plugins by distribution name; importing this module registers er_il's."""
+
+import er_il.lerobot_env  # noqa: F401  --env.type=er_il
