@@ -78,7 +78,8 @@ class Rot6d(RotationCode):
     def decode(self, code: Array) -> Array:
         x = _unit(code[:3])
         y = _unit(code[3:] - x * (x @ code[3:]))
-        return np.column_stack([x, y, np.cross(x, y)])
+        z = np.asarray(np.cross(x, y), dtype=np.float64)
+        return np.column_stack([x, y, z])
 
 
 def _unit(v: Array) -> Array:

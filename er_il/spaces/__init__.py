@@ -1,6 +1,7 @@
 """The action spaces: joint, task and the paper's redundancy-aware ER family."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from er_il.arm import Arm, Vector
@@ -8,6 +9,7 @@ from er_il.errors import ArmError, SpecError, UnknownNameError
 from er_il.kinematics import kinematics_of
 from er_il.rotation import Quaternion, RotationCode, make_rotation
 from er_il.spaces.base import SPEC_VERSION, ActionSpace, Decoded
+from er_il.spaces.era import EraSpace
 from er_il.spaces.erj import ErjSpace
 from er_il.spaces.joint import JointSpace
 from er_il.spaces.task import TaskSpace
@@ -24,18 +26,30 @@ def _task(arm: Arm, rotation: RotationCode, posture: Vector | None) -> ActionSpa
 
 
 def _erj(arm: Arm, rotation: RotationCode, posture: Vector | None) -> ActionSpace:
+    _require_redundancy(arm)
+    return ErjSpace(arm, rotation)
+
+
+def _era(arm: Arm, rotation: RotationCode, posture: Vector | None) -> ActionSpace:
+    _require_redundancy(arm)
+    if arm.redundancy > 1:
+        raise ArmError(f"{arm.name} has {arm.redundancy} redundant joints; one arm angle fixes only one. Use erj.")
+    return EraSpace(arm, rotation, reference=float(kinematics_of(arm).arm_angle.along(arm.home[None])[0]))
+
+
+def _require_redundancy(arm: Arm) -> None:
     if arm.redundancy == 0:
         raise ArmError(
             f"{arm.name} has {arm.dof} joints and so no redundancy: an end-effector pose already fixes them. "
             "Use joint or task."
         )
-    return ErjSpace(arm, rotation)
 
 
 SPACES: dict[str, Callable[[Arm, RotationCode, Vector | None], ActionSpace]] = {
     "joint": _joint,
     "task": _task,
     "erj": _erj,
+    "era": _era,
 }
 
 
@@ -43,14 +57,14 @@ def make_action_space(kind: str, arm: Arm, *, rotation: str = "quat", posture: V
     """Build an absolute action space by name.
 
     Args:
-        kind: ``joint``, ``task`` or ``erj``.
+        kind: ``joint``, ``task``, ``erj`` or ``era``.
         arm: The arm it commands.
         rotation: ``quat`` or ``rot6d``; the quaternion's hemisphere is that of the arm's home pose.
         posture: (n,) [rad] null-space posture for ``task``; without it IK stays near the seed.
 
     Raises:
         UnknownNameError: unknown kind or rotation.
-        ArmError: an ER space for an arm without redundancy.
+        ArmError: an ER space for an arm without redundancy, or ERA without the arm's angle frames.
     """
     if kind not in SPACES:
         raise UnknownNameError("action space", kind, SPACES)
@@ -82,10 +96,16 @@ def from_spec(spec: Mapping[str, Any], arm: Arm | None = None, *, posture: Vecto
         if kind not in SPACES:
             raise UnknownNameError("action space", kind, SPACES)
         space = SPACES[kind](arm, rotation, posture)
+        if isinstance(space, EraSpace):
+            space = replace(space, reference=float(spec["arm_angle"]["reference"]))
         expected = {key: described[key] for key in ("joints", "base_frame", "ee_frame", "redundant", "fingerprint")}
     except KeyError as error:
         raise SpecError(f"Action spec has no {error}.") from error
     actual = space.spec()["arm"]
+    if (angle := space.spec().get("arm_angle")) != spec.get("arm_angle"):
+        raise SpecError(
+            f"The action spec measures the arm angle by {spec.get('arm_angle')}, but {arm.name!r} by {angle}."
+        )
     for key, value in expected.items():
         if actual[key] != value:
             raise SpecError(f"The action spec is for {key} {value}, but the arm {arm.name!r} has {actual[key]}.")

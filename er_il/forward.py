@@ -1,0 +1,108 @@
+"""Forward kinematics of an arm: poses and Jacobians of its links, by Pinocchio."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import pinocchio as pin  # pyright: ignore[reportMissingImports]
+from numpy.typing import ArrayLike, NDArray
+
+from er_il.arm import Arm, Vector
+from er_il.errors import ShapeError, UnknownNameError
+
+Array = NDArray[np.float64]
+AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+
+
+class ForwardKinematics:
+    """Forward kinematics of one arm. Not thread-safe: one object a process."""
+
+    def __init__(self, arm: Arm) -> None:
+        self.arm = arm
+        self._model = pin.buildModelFromXML(arm.model_xml)
+        self._data = self._model.createData()
+        # The URDF may list joints in another order than the arm's vectors do.
+        self._order = np.array([self._model.joints[self._model.getJointId(j)].idx_q for j in arm.joints])
+        self._base = self._model.getFrameId(arm.base_frame)
+        self._ee = self._model.getFrameId(arm.ee_frame)
+
+    def fk(self, q: ArrayLike) -> Array:
+        """End-effector pose ``T_base_ee`` (4, 4) at joint angles q (n,) [rad]."""
+        return self._pose(self._checked(q), self._ee)
+
+    def frame_pose(self, q: ArrayLike, frame: str) -> Array:
+        """Pose ``T_base_frame`` (4, 4) of any link at joint angles q (n,) [rad]."""
+        return self._pose(self._checked(q), self._frame_id(frame))
+
+    def fk_batch(self, q: ArrayLike, frame: str | None = None) -> Array:
+        """Poses ``T_base_frame`` (N, 4, 4) of a link, the end effector if omitted, at q (N, n) [rad]."""
+        angles = np.asarray(q, dtype=np.float64)
+        if angles.ndim != 2 or angles.shape[1] != self.arm.dof:
+            raise ShapeError("Joint angles", angles.shape, f"(N, {self.arm.dof})")
+        full = np.zeros((len(angles), self._model.nq))
+        full[:, self._order] = angles
+        target = self._ee if frame is None else self._frame_id(frame)
+        poses = np.empty((len(angles), 4, 4))
+        model, data, base = self._model, self._data, self._base
+        for pose, angle in zip(poses, full, strict=True):
+            pin.forwardKinematics(model, data, angle)
+            T_world_base = pin.updateFramePlacement(model, data, base)
+            pose[:] = T_world_base.actInv(pin.updateFramePlacement(model, data, target)).homogeneous
+        return poses
+
+    def jacobian(self, q: ArrayLike, frame: str | None = None) -> Array:
+        """Geometric Jacobian (6, n) of a link, the end effector if omitted, in the base frame's axes.
+
+        Linear rows [m/rad] first, then angular rows [rad/rad].
+        """
+        target = self._ee if frame is None else self._frame_id(frame)
+        full = pin.computeFrameJacobian(self._model, self._data, self._model_q(self._checked(q)), target, AXES)
+        R_base_world = pin.updateFramePlacement(self._model, self._data, self._base).rotation.T
+        return np.vstack([R_base_world @ full[:3], R_base_world @ full[3:]])[:, self._order]
+
+    def pose_error(self, T_base_ee: Array, q: ArrayLike) -> tuple[float, float]:
+        """Distance [m] and angle [rad] between a target pose and the pose at q."""
+        T = self.fk(q)
+        gap = T_base_ee[:3, 3] - T[:3, 3]
+        return math.sqrt(gap @ gap), _rotation_angle(T[:3, :3].T @ T_base_ee[:3, :3])
+
+    def points(self, q: Vector, frames: Sequence[str]) -> tuple[Array, Array]:
+        """Origins (k, 3) [m] of links in the base frame at q (n,) [rad], and their derivatives (k, 3, n)."""
+        model, data = self._model, self._data
+        pin.computeJointJacobians(model, data, self._model_q(q))
+        T_world_base = pin.updateFramePlacement(model, data, self._base)
+        R_base_world = T_world_base.rotation.T
+        origins, slopes = [], []
+        for frame in frames:
+            index = self._frame_id(frame)
+            origins.append(T_world_base.actInv(pin.updateFramePlacement(model, data, index).translation))
+            slopes.append(R_base_world @ pin.getFrameJacobian(model, data, index, AXES)[:3, self._order])
+        return np.array(origins), np.array(slopes)
+
+    def _pose(self, q: Vector, frame: int) -> Array:
+        model, data = self._model, self._data
+        pin.forwardKinematics(model, data, self._model_q(q))
+        T_world_base = pin.updateFramePlacement(model, data, self._base)
+        return T_world_base.actInv(pin.updateFramePlacement(model, data, frame)).homogeneous
+
+    def _frame_id(self, frame: str) -> int:
+        if not self._model.existFrame(frame):
+            raise UnknownNameError("frame", frame, [f.name for f in self._model.frames])
+        return self._model.getFrameId(frame)
+
+    def _model_q(self, q: Vector) -> Vector:
+        full = np.zeros(self._model.nq)
+        full[self._order] = q
+        return full
+
+    def _checked(self, q: ArrayLike) -> Vector:
+        angles = np.asarray(q, dtype=np.float64)
+        if angles.shape != (self.arm.dof,):
+            raise ShapeError("Joint angles", angles.shape, f"({self.arm.dof},)")
+        return angles
+
+
+def _rotation_angle(R: Array) -> float:
+    """Angle [rad] of a rotation matrix (3, 3), exact to rounding for small angles too."""
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = R.tolist()
+    return math.atan2(math.hypot(zy - yz, xz - zx, yx - xy), xx + yy + zz - 1.0)
