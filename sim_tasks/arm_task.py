@@ -48,12 +48,28 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
     start: ClassVar[tuple[float, ...]]  # (n,) [rad]
 
     def __init__(
-        self, *, cameras: Sequence[str] = (), image_size: int = 96, render_mode: str | None = None, arm: str = "panda"
+        self,
+        *,
+        cameras: Sequence[str] = (),
+        image_size: int = 96,
+        render_mode: str | None = None,
+        arm: str = "panda",
+        start_range: float = 0.02,
     ) -> None:
+        """Build the world.
+
+        Args:
+            cameras: Cameras to observe; none by default, which needs no GL.
+            image_size: Side [px] of their square images.
+            render_mode: ``rgb_array`` for :meth:`render`.
+            arm: Preset of the follower and the leader.
+            start_range: Each joint starts up to this far [rad] from the start posture.
+        """
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise UnknownNameError("render mode", render_mode, self.metadata["render_modes"])
         self.arm = Arm.preset(arm)
         self.render_mode = render_mode
+        self._start_range = start_range
         spec = scene_spec(self.arm)
         self._build(spec)
         self._model = spec.compile()
@@ -133,6 +149,7 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Start an episode. ``options={"state": {name: (x, y, yaw)}}`` places objects by hand."""
         super().reset(seed=seed)
+        start = np.array(self.start) + self.np_random.uniform(-self._start_range, self._start_range, self.arm.dof)
         placement = self._draw(self.np_random)
         chosen = (options or {}).get("state", {})
         for name, where in chosen.items():
@@ -141,7 +158,7 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
             x, y, yaw = where
             placement[name] = (float(x), float(y), float(yaw))
         mujoco.mj_resetData(self._model, self._data)
-        self._robot.place(self._data, np.array(self.start), 1.0)
+        self._robot.place(self._data, start, 1.0)
         self._place(placement)
         mujoco.mj_forward(self._model, self._data)
         self._steps = self._success_steps = 0

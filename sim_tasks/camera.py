@@ -42,9 +42,9 @@ VIEWS = (
     # On the hand, opposite the robot's own flange lights; both fingertips in view.
     View("wrist", "panda_hand", (-0.075, 0.0, 0.02), (0.0, 0.0, 0.15), 70, up=(-1.0, 0.0, 0.0)),
     # Over the robot's left shoulder into the workspace.
-    View("shoulder", "world", (-0.30, 0.55, 1.25), (0.55, 0.0, 0.55), 52),
-    # For people: the whole scene from the front left.
-    View(SHOWCASE, "world", (-0.35, 1.55, 1.15), (0.38, 0.0, 0.5), 45),
+    View("shoulder", "world", (-0.10, 0.50, 1.20), (0.60, 0.0, 0.55), 58),
+    # For people: the whole scene from the right.
+    View(SHOWCASE, "world", (-0.75, -1.45, 1.35), (0.33, 0.0, 0.5), 44),
 )
 
 

@@ -16,6 +16,7 @@ from sim_tasks.scene import scene_spec
 CUP = "cup"
 GRASP_HEIGHT = 0.09  # [m] of the fingertips above the surface the cup stands on, at mid-stem
 PITCH = np.radians(20)  # of the hand below the horizontal
+LIFT = np.array([-0.03, 0.0, 0.022])  # [m] of the hand, from the grasp
 FREED = 0.01  # [m] of the foot above the surface
 TIPPED = np.cos(np.radians(25))  # cosine of the tilt from which a stemmed cup falls
 CLOSED = 0.5  # opening below which the gripper counts as closed
@@ -30,22 +31,22 @@ class CupTask(ArmTask):
     cup = Goblet()
     surface: float  # z [m] on which the cup stands
     centre: tuple[float, float]  # x, y [m] of the cup's mean place
-    via: tuple[float, float, float]  # [m] where the hand turns towards the cup, relative to the grasp
-    elbow: float  # [rad] base joint that keeps the elbow up on the way
+    # The way of the leader's hand: offset [m] from the grasp, and base joint [rad] that puts the elbow there.
+    way: tuple[tuple[tuple[float, float, float], float], ...]
 
     def __init__(
         self,
         *,
         cup_range: tuple[float, float] = (0.03, 0.03),
         via_range: float = 0.01,
-        speed_range: tuple[float, float] = (0.30, 0.38),
+        speed_range: tuple[float, float] = (0.45, 0.55),
         **kwargs: Any,
     ) -> None:
         """Build the task.
 
         Args:
             cup_range: Sides [m] of the rectangle in which the cup stands.
-            via_range: The leader's hand enters up to this far [m] from the nominal place.
+            via_range: The leader's hand turns towards the cup up to this far [m] from the nominal place.
             speed_range: The leader's share of the joints' velocity limits.
             kwargs: See :class:`ArmTask`.
         """
@@ -104,17 +105,15 @@ class CupTask(ArmTask):
     def _script(self, rng: np.random.Generator) -> tuple[Sequence[Stretch], float]:
         x, y = self.object_pose(CUP)[:2]
         grasp = np.array([x, y, self.surface + GRASP_HEIGHT])
-        enter = grasp + self.via + rng.uniform(-self._via_range, self._via_range, 3)
-        before = grasp + (-0.10, 0.0, 0.005)
-        lifted = grasp + (-0.03, 0.0, 0.022)
-        approach = [
-            Keyframe(self._hand(enter), self.elbow),
-            Keyframe(self._hand(before), self.elbow, straight=True),
-            Keyframe(self._hand(grasp), self.elbow, straight=True),
+        turn = rng.uniform(-self._via_range, self._via_range, 3)
+        keyframes = [
+            Keyframe(self._hand(grasp + offset + (turn if i == 0 else 0.0)), elbow, straight=i > 0)
+            for i, (offset, elbow) in enumerate(self.way)
         ]
+        lifted = Keyframe(self._hand(grasp + LIFT), self.way[-1][1], straight=True)
         is_free = self._collisions.is_free
-        reach = plan_stretch(self.arm, self.joint_positions, approach, is_free)
-        lift = plan_stretch(self.arm, reach[-1], [Keyframe(self._hand(lifted), self.elbow, straight=True)], is_free)
+        reach = plan_stretch(self.arm, self.joint_positions, keyframes, is_free)
+        lift = plan_stretch(self.arm, reach[-1], [lifted], is_free)
         script = [
             Stretch(reach, gripper=1.0),
             Stretch(reach[-1:], gripper=0.0, hold=GRASP_TIME),

@@ -1,8 +1,8 @@
-"""Lift Cup: the same cup at the same place on an open stand, where any elbow will do (control)."""
+"""Lift Cup: the same cup on an open stand, where any elbow will do (the negative control)."""
 
 import mujoco
 
-from sim_tasks.cup_task import CupTask
+from sim_tasks.cup_task import CUP, CupTask
 from sim_tasks.props import Stand
 
 
@@ -11,15 +11,18 @@ class LiftCup(CupTask):
 
     task = "lift_cup"
     task_description = "Grasp the cup on the stand by its stem and lift it."
-    max_steps = 260
+    max_steps = 200
     stand = Stand()
     obstacles = ("stand",)
     surface = stand.height
-    centre = (0.72, 0.0)
-    via = (-0.34, 0.0, 0.04)
-    start = (1.132, -0.988, -0.315, -1.867, -1.083, 1.922, -1.732)
-    elbow = 0.1
+    centre = stand.centre
+    start = (0.0, -0.83, 0.0, -1.95, 0.0, 2.34, -2.36)  # above and in front of the stand, the elbow up
+    way = (
+        ((-0.20, 0.0, 0.04), 0.1),
+        ((-0.10, 0.0, 0.01), 0.1),
+        ((0.0, 0.0, 0.0), 0.1),
+    )
 
     def _build(self, spec: mujoco.MjSpec) -> None:
         self.stand.add(spec, "stand", "wood")
-        self.cup.add(spec, "cup", (*self.centre, self.surface), "copper")
+        self.cup.add(spec, CUP, (*self.centre, self.surface), "copper")

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -14,7 +15,7 @@ from er_il.kinematics import Status, kinematics_of
 STRAIGHT_STEP = 0.02  # [m] spacing of the waypoints of a straight stretch
 CHECK_STEP = 0.05  # [rad] spacing of collision checks
 ELBOW_SEARCH = np.linspace(0.0, 0.6, 13)  # [rad] how far the elbow may leave its wish to be free
-PEAK_OF_EASING = 15 / 8  # highest speed of the minimum-jerk profile over its mean speed
+GRID = 400  # points at which a motion's speed is measured
 
 
 @dataclass(frozen=True)
@@ -42,10 +43,15 @@ class Stretch:
             return still
         knots = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(waypoints, axis=0), axis=1))])
         curve = PchipInterpolator(knots / knots[-1], waypoints)
-        slope = np.max(np.abs(curve(np.linspace(0, 1, 200), 1)) / arm.velocity)
-        steps = max(2, int(np.ceil(slope * PEAK_OF_EASING / speed / period)))
-        t = np.arange(1, steps + 1) / steps
-        return np.concatenate([curve(t**3 * (10 - 15 * t + 6 * t**2)), still])
+        grid = np.linspace(0, 1, GRID)
+        fastest = np.max(np.abs(np.diff(curve(_ease(grid)), axis=0)) * (GRID - 1) / arm.velocity)  # [s] at full speed
+        steps = max(2, int(np.ceil(fastest / speed / period)))
+        return np.concatenate([curve(_ease(np.arange(1, steps + 1) / steps)), still])
+
+
+def _ease(t: np.ndarray) -> np.ndarray:
+    """Minimum-jerk progress in [0, 1] at shares t of the time."""
+    return t**3 * (10 - 15 * t + 6 * t**2)
 
 
 def solve_keyframe(arm: Arm, keyframe: Keyframe, seed: Vector, is_free: Callable[[Vector], bool]) -> Vector:
@@ -79,7 +85,7 @@ def plan_stretch(
         goal = solve_keyframe(arm, keyframe, waypoints[-1], is_free)
         waypoints += _straight(arm, waypoints[-1], goal, keyframe) if keyframe.straight else [goal]
     path = np.array(waypoints)
-    for one, other in zip(path, path[1:], strict=False):
+    for one, other in pairwise(path):
         for t in np.linspace(0, 1, max(2, int(np.max(np.abs(other - one)) / CHECK_STEP) + 1)):
             if not is_free((1 - t) * one + t * other):
                 raise PlanError("The way between two keyframes is blocked.")

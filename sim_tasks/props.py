@@ -98,10 +98,28 @@ class Cabinet:
 
 
 @dataclass(frozen=True)
+class Wall:
+    """An upright panel across the robot's back."""
+
+    x: float = -0.20  # of its face
+    width: float = 1.1
+    height: float = 1.0
+    thickness: float = 0.02
+
+    def add(self, spec: mujoco.MjSpec, name: str, material: str) -> mujoco.MjsBody:
+        """Add the wall, fixed to the world."""
+        body = spec.worldbody.add_body(name=name)
+        size = (self.thickness / 2, self.width / 2, self.height / 2)
+        centre = (self.x - self.thickness / 2, 0, self.height / 2)
+        body.add_geom(name=name, type=BOX, size=size, pos=centre, material=material)
+        return body
+
+
+@dataclass(frozen=True)
 class Stand:
     """A table on one column."""
 
-    centre: tuple[float, float] = (0.72, 0.0)
+    centre: tuple[float, float] = (0.62, 0.0)
     height: float = 0.50
     size: tuple[float, float] = (0.24, 0.30)
 
