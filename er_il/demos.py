@@ -1,6 +1,6 @@
 """Demonstrations: the scripted leader plays a task, the follower mirrors it, and what happened is kept."""
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterator, Mapping
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
@@ -109,7 +109,7 @@ def collect(recipe: Recipe, folder: Path, workers: int) -> Iterator[tuple[int, s
         DatasetError: most demos fail, or a worker died.
     """
     seeds, pending = recipe.demo_seeds(), deque()
-    kept = dropped = 0
+    kept, dropped = 0, Counter[str]()
     with worker_pool(workers, _prepare, recipe, folder) as pool:
         while kept < recipe.episodes:
             while len(pending) < recipe.episodes - kept:
@@ -120,10 +120,21 @@ def collect(recipe: Recipe, folder: Path, workers: int) -> Iterator[tuple[int, s
                 reason = job.result()
             except BrokenProcessPool as error:
                 raise DatasetError("A worker process died, perhaps out of memory. The same command resumes.") from error
-            kept, dropped = (kept, dropped + 1) if reason else (kept + 1, dropped)
-            if dropped >= kept + HOPELESS:
-                raise DatasetError(f"{dropped} of the first {kept + dropped} demos failed, the last by: {reason}.")
+            if reason:
+                dropped[reason] += 1
+            else:
+                kept += 1
+            if dropped.total() >= kept + HOPELESS:
+                raise DatasetError(
+                    f"{dropped.total()} of the first {kept + dropped.total()} demos failed ({tally(dropped)}): "
+                    f"the leader cannot do {recipe.task} like this. Look at the recipe's randomisation."
+                )
             yield seed, reason
+
+
+def tally(reasons: Mapping[str, int]) -> str:
+    """Return counted reasons, the most common first: ``no plan 3, timeout 1``."""
+    return ", ".join(f"{reason} {count}" for reason, count in Counter(reasons).most_common())
 
 
 def demo_path(folder: Path, seed: int) -> Path:
@@ -140,20 +151,15 @@ class _Recorder:
     world: gymnasium.Env[Any, Any] | None = None
 
     def record(self, seed: int) -> str:
-        demo, note = demo_path(self.folder, seed), self.folder / f"{seed}.dropped"
-        if demo.exists():
+        path = demo_path(self.folder, seed)
+        if path.exists():
             return ""
-        if note.exists():
-            return note.read_text()
         self.world = self.world or make_world(self.recipe)
         outcome = record_demo(self.world, seed)
-        if isinstance(outcome, Demo):
-            outcome.save(demo)
-            return ""
-        partial = note.with_suffix(".partial")
-        partial.write_text(outcome)
-        partial.rename(note)
-        return outcome
+        if isinstance(outcome, str):
+            return outcome
+        outcome.save(path)
+        return ""
 
 
 _recorder: _Recorder | None = None

@@ -1,6 +1,7 @@
 """Generating datasets: demos are recorded once and written as one LeRobot v3 dataset a space."""
 
 import json
+import os
 import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -8,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import av.logging
 import gymnasium
 import numpy as np
 from lerobot.datasets import LeRobotDataset
@@ -135,6 +137,8 @@ class _Writer:
         # Without LeRobot's footers, which it writes at the end, an interrupted dataset is unreadable.
         shutil.rmtree(root, ignore_errors=True)
         self._recipe, self._space = recipe, space
+        os.environ.setdefault("SVT_LOG", "1")  # errors only: the encoders would bury the progress bar
+        av.logging.set_libav_level(av.logging.ERROR)
         unwrapped: Any = world.unwrapped
         self._description: str = unwrapped.task_description
         self._dataset = LeRobotDataset.create(

@@ -17,7 +17,6 @@ def generate(
     cameras: Annotated[str | None, arg(metavar="NAME,NAME")] = None,
     size: int | None = None,
     out: Path | None = None,
-    workers: int | None = None,
 ) -> None:
     """Record demonstrations of a task and write one LeRobot dataset a space.
 
@@ -31,13 +30,11 @@ def generate(
         cameras: Cameras to record, separated by commas, such as wrist,shoulder.
         size: Width and height of the cameras' images [px].
         out: Folder of the datasets; datasets/<task> if omitted.
-        workers: Worker processes; one a core if omitted.
     """
     from rich.console import Console
 
     from er_il.cli.progress import make_progress
     from er_il.recipe import Recipe
-    from er_il.recording import generate as generate_datasets
     from er_il.workers import cores
 
     recipe = Recipe.load(task)
@@ -45,14 +42,16 @@ def generate(
         recipe = recipe.resized(episodes)
     given = {"seed": seed, "cameras": _split(cameras), "image_size": size}
     recipe = replace(recipe, **{key: value for key, value in given.items() if value is not None})
+    from er_il.demos import tally
+    from er_il.recording import generate as generate_datasets  # seconds of imports: wrong options are told before
+
     folder = out if out is not None else Path("datasets") / task
     console = Console()
     with make_progress(console) as progress:
-        generated = generate_datasets(recipe, _split(spaces) or (), folder, progress, workers or cores())
+        generated = generate_datasets(recipe, _split(spaces) or (), folder, progress, cores())
     for space, path in generated.paths.items():
         console.print(f"{path}: {'written' if space in generated.new else 'was there already'}", highlight=False)
-    reasons = Counter(generated.dropped.values())
-    dropped = ", ".join(f"{reason} {count}" for reason, count in reasons.most_common())
+    dropped = tally(Counter(generated.dropped.values()))
     console.print(
         f"{recipe.episodes} demonstrations, {len(generated.dropped)} dropped{f' ({dropped})' * bool(dropped)}."
     )

@@ -1,0 +1,120 @@
+import hashlib
+import json
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from lerobot.datasets import LeRobotDataset
+
+from er_il.arm import Arm
+from er_il.encoding import encode_actions, encode_dataset
+from er_il.errors import DatasetError
+from er_il.schema import ACTION, LEADER_JOINTS, action_feature
+from er_il.spaces import make_action_space
+
+PANDA = Arm.preset("panda")
+LENGTHS = (30, 25)
+
+
+def _episodes():
+    """Joint paths in which the hand turns by more than half a turn: its quaternion's sign must be carried along."""
+    for number, length in enumerate(LENGTHS):
+        q = np.tile(PANDA.home, (length, 1))
+        q[:, -1] = np.linspace(PANDA.lower[-1] + 0.1, PANDA.upper[-1] - 0.1, length)
+        q[:, 0] += 0.3 * np.sin(np.arange(length) / 5 + number)
+        yield np.column_stack([q, np.linspace(1, 0, length)]).astype(np.float32)
+
+
+def _write(root, kind, leader=False):
+    """Write the episodes with LeRobot itself, actions in the space ``kind``."""
+    space = make_action_space(kind, PANDA)
+    columns = {ACTION: action_feature(space), "observation.state": _state()}
+    if leader:
+        columns[LEADER_JOINTS] = action_feature(make_action_space("joint", PANDA)) | {"info": None}
+    dataset = LeRobotDataset.create("er_il/test", 20, columns, root=root, video_backend="pyav")
+    for joints in _episodes():
+        actions = encode_actions(joints, space)
+        for t, row in enumerate(joints):
+            frame = {ACTION: actions[t], "observation.state": np.float32([t, 2 * t]), "task": "turn"}
+            dataset.add_frame(frame | ({LEADER_JOINTS: row} if leader else {}))
+        dataset.save_episode()
+    dataset.finalize()
+    return root
+
+
+def _state():
+    return {"dtype": "float32", "shape": (2,), "names": ["a", "b"]}
+
+
+@pytest.fixture(scope="module")
+def joint(tmp_path_factory):
+    return _write(tmp_path_factory.mktemp("joint") / "data", "joint")
+
+
+@pytest.mark.parametrize("kind", ["erj", "task"])
+def test_re_encoding_equals_recording_in_that_space(joint, tmp_path, kind):
+    native = _write(tmp_path / "native", kind)
+    encode_dataset(joint, tmp_path / "encoded", make_action_space(kind, PANDA))
+    encoded = tmp_path / "encoded"
+    _assert_same_data(encoded, native)
+    assert (encoded / "meta/info.json").read_bytes() == (native / "meta/info.json").read_bytes()
+    assert json.loads((encoded / "meta/stats.json").read_text()) == json.loads((native / "meta/stats.json").read_text())
+    episodes = "meta/episodes/chunk-000/file-000.parquet"
+    ours, theirs = pq.read_table(encoded / episodes), pq.read_table(native / episodes)
+    assert ours.schema.equals(theirs.schema)
+    assert ours.to_pydict() == theirs.to_pydict()
+
+
+def test_the_source_is_untouched_and_leftovers_are_cleared(joint, tmp_path):
+    before = _hashes(joint)
+    (tmp_path / "encoded.partial" / "data").mkdir(parents=True)
+    (tmp_path / "encoded.partial" / "data" / "half.parquet").write_bytes(b"half")
+    encode_dataset(joint, tmp_path / "encoded", make_action_space("erj", PANDA))
+    assert _hashes(joint) == before
+    assert [path.name for path in tmp_path.iterdir()] == ["encoded"]
+    assert not list(tmp_path.rglob("half.parquet"))
+
+
+def test_the_recorded_joints_survive_any_chain_of_encodings(tmp_path):
+    first = _write(tmp_path / "first", "joint", leader=True)
+    encode_dataset(first, tmp_path / "task", make_action_space("task", PANDA))  # drops the elbow
+    encode_dataset(tmp_path / "task", tmp_path / "back", make_action_space("joint", PANDA))
+    _assert_same_data(tmp_path / "back", first)
+
+
+def test_quaternions_are_continuous_within_and_start_afresh_in_each_episode(joint, tmp_path):
+    encode_dataset(joint, tmp_path / "task", make_action_space("task", PANDA))
+    dataset = LeRobotDataset("er_il/test", root=tmp_path / "task", video_backend="pyav")
+    quaternions = np.stack(dataset.hf_dataset[ACTION])[:, 3:7]
+    one, other = np.split(quaternions, [LENGTHS[0]])
+    for episode in (one, other):
+        assert np.all(np.sum(episode[1:] * episode[:-1], axis=1) > 0.9)
+    assert one[0] @ other[0] > 0.9
+    assert one[0] @ one[-1] < 0  # the turn takes it to the other hemisphere
+
+
+def test_datasets_that_cannot_be_encoded(joint, tmp_path):
+    erj = make_action_space("erj", PANDA)
+    task = _write(tmp_path / "task", "task")
+    with pytest.raises(DatasetError, match="no joint angles"):
+        encode_dataset(task, tmp_path / "out", erj)
+    with pytest.raises(DatasetError, match=r"not a LeRobot v3 dataset"):
+        encode_dataset(tmp_path / "nothing", tmp_path / "out", erj)
+    with pytest.raises(FileExistsError):
+        encode_dataset(joint, task, erj)
+    assert not (tmp_path / "out").exists()
+
+
+def _assert_same_data(one, other):
+    """Same rows, types and row groups; only the fingerprint that Hugging Face draws for each dataset may differ."""
+    files = [pq.ParquetFile(root / "data/chunk-000/file-000.parquet") for root in (one, other)]
+    ours, theirs = (file.read() for file in files)
+    assert ours.equals(theirs)
+    assert ours.schema.equals(theirs.schema)
+    described = [json.loads(table.schema.metadata[b"huggingface"])["info"] for table in (ours, theirs)]
+    assert described[0] == described[1]
+    assert files[0].num_row_groups == files[1].num_row_groups
+
+
+def _hashes(root):
+    return {path: hashlib.sha256(path.read_bytes()).hexdigest() for path in root.rglob("*") if path.is_file()}

@@ -1,0 +1,80 @@
+import json
+
+import pytest
+
+from er_il.errors import DatasetError, UnknownNameError
+from er_il.recipe import DEMO_SEED_BASE, Recipe, recipe_names
+from er_il.tasks import task_names
+
+FIRST_EVALUATION_SEED = 1000  # LeRobot's
+
+
+def test_shipped_recipes_are_the_paper_s_split_and_fit_a_task():
+    assert set(recipe_names()) == {"reach_cup", "lift_cup"}
+    for name in recipe_names():
+        recipe = Recipe.load(name)
+        assert recipe.task == name
+        assert name in task_names()
+        assert (recipe.episodes, recipe.validation) == (40, 8)
+        assert recipe.splits == {"train": "0:32", "validation": "32:40"}
+
+
+def test_round_trip_through_json():
+    recipe = Recipe(
+        "reach_cup", 5, 1, seed=3, cameras=("wrist",), image_size=32, randomisation={"cup_range": [0.01, 0.02]}
+    )
+    assert Recipe.from_dict(json.loads(json.dumps(recipe.to_dict()))) == recipe
+
+
+@pytest.mark.parametrize(("episodes", "validation"), [(40, 8), (10, 2), (12, 3), (2, 1), (1, 0)])
+def test_resized_keeps_the_share_and_something_to_train_on(episodes, validation):
+    assert Recipe("reach_cup", 40, 8).resized(episodes).validation == validation
+
+
+def test_demo_seeds_never_meet_evaluation_seeds_nor_another_recipe_seed():
+    demos = [set(_first(Recipe("reach_cup", 40, 8, seed=seed).demo_seeds(), 200)) for seed in (0, 1, 2)]
+    assert not demos[0] & demos[1] | demos[1] & demos[2] | demos[0] & demos[2]
+    assert min(min(seeds) for seeds in demos) >= DEMO_SEED_BASE > FIRST_EVALUATION_SEED + 10_000
+
+
+def test_differences_name_key_and_both_values():
+    one, other = Recipe("reach_cup", 40, 8), Recipe("reach_cup", 40, 8, seed=7, cameras=("wrist",))
+    assert one.differences(one) == ""
+    assert one.differences(other) == "seed 0 instead of 7, cameras [] instead of ['wrist']"
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ("reach_cup", "mapping"),
+        ({"task": "reach_cup", "episodes": 40}, "lacks validation"),
+        ({"task": "reach_cup", "episodes": 40, "validation": 8, "camera": []}, "no camera. Valid: task"),
+        ({"task": "reach_cup", "episodes": "many", "validation": 8}, "'many', not a whole number"),
+        ({"task": "reach_cup", "episodes": True, "validation": 0}, "not a whole number"),
+        ({"task": "reach_cup", "episodes": 40, "validation": 8, "cameras": "wrist"}, "not a list"),
+        ({"task": "reach_cup", "episodes": 40, "validation": 8, "randomisation": [1]}, "not a mapping"),
+        ({"task": "reach_cup", "episodes": 0, "validation": 0}, "at least one episode, not 0"),
+        ({"task": "reach_cup", "episodes": 8, "validation": 8}, "at least one must be left"),
+        ({"task": "reach_cup", "episodes": 8, "validation": 1, "seed": -1}, "negative"),
+        ({"task": "reach_cup", "episodes": 8, "validation": 1, "image_size": 97}, "even number"),
+        ({"task": "reach_cup", "episodes": 8, "validation": 1, "cameras": ["wrist", "wrist"]}, "twice"),
+    ],
+)
+def test_wrong_recipes_are_refused_by_name(values, message):
+    with pytest.raises(DatasetError, match=message):
+        Recipe.from_dict(values)
+
+
+def test_files_that_are_no_recipe(tmp_path):
+    path = tmp_path / "broken.yaml"
+    path.write_text("task: [reach_cup")
+    with pytest.raises(DatasetError, match=r"broken\.yaml is not valid YAML"):
+        Recipe.from_file(path)
+    with pytest.raises(DatasetError, match=r"no recipe .*missing\.yaml"):
+        Recipe.from_file(tmp_path / "missing.yaml")
+    with pytest.raises(UnknownNameError, match=r"'sweep'\. Valid: lift_cup, reach_cup"):
+        Recipe.load("sweep")
+
+
+def _first(seeds, number):
+    return [next(seeds) for _ in range(number)]

@@ -1,0 +1,182 @@
+import json
+import resource
+import subprocess
+import sys
+import time
+from dataclasses import replace
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from lerobot.datasets import LeRobotDataset
+from rich.progress import Progress
+
+from er_il.demos import Demo, make_world, record_demo
+from er_il.errors import DatasetError, UnknownNameError
+from er_il.recipe import Recipe
+from er_il.recording import Record, generate
+from er_il.schema import ACTION, DEMO_SEED, LEADER_JOINTS, action_spec
+from er_il.spaces import from_spec
+
+RECIPE = Recipe.load("lift_cup").resized(3)
+
+
+@pytest.fixture(scope="module")
+def generated(tmp_path_factory):
+    out = tmp_path_factory.mktemp("data") / "lift_cup"
+    return generate(RECIPE, ["joint", "erj"], out, Progress(disable=True), workers=2)
+
+
+def _load(path):
+    return LeRobotDataset("er_il/test", root=path, video_backend="pyav")
+
+
+def _table(path):
+    return pq.read_table(path / "data/chunk-000/file-000.parquet")
+
+
+def test_a_dataset_says_what_it_holds(generated):
+    dataset = _load(generated.paths["erj"])
+    columns, space = dataset.meta.features, from_spec(action_spec(dataset.meta.features))
+    assert dataset.num_episodes == 3
+    assert dataset.fps == 20
+    assert dataset.meta.info.splits == {"train": "0:2", "validation": "2:3"}
+    assert columns[ACTION]["names"] == list(space.names)
+    assert len(columns["observation.state"]["names"]) == columns["observation.state"]["shape"][0] == 15
+    assert columns["observation.environment_state"]["names"][0] == "cup.x"
+    assert dataset[0]["task"] == dataset.meta.tasks.index[0] != ""
+    assert [name for name in columns if name.startswith(ACTION)] == [ACTION]  # others would become policy outputs
+    record = Record.read(generated.paths["erj"])
+    assert record.recipe == RECIPE
+    assert record.dropped == generated.dropped
+    assert generated.new == ("joint", "erj")
+
+
+def test_the_actions_are_the_encoded_leader(generated):
+    joint, erj = (_load(generated.paths[kind]) for kind in ("joint", "erj"))
+    leader = np.stack(joint.hf_dataset[LEADER_JOINTS])
+    np.testing.assert_array_equal(np.stack(joint.hf_dataset[ACTION]), leader)
+    np.testing.assert_array_equal(np.stack(erj.hf_dataset[LEADER_JOINTS]), leader)
+    space = from_spec(action_spec(erj.meta.features))
+    actions = np.stack(erj.hf_dataset[ACTION])
+    for row in (0, len(leader) // 2, len(leader) - 1):
+        decoded = space.decode(actions[row], seed=leader[row, :-1] + 0.01)
+        np.testing.assert_allclose(decoded.q, leader[row, :-1], atol=1e-3)
+        assert decoded.gripper == pytest.approx(leader[row, -1], abs=1e-6)
+
+
+def test_a_demo_seed_brings_its_world_back(generated):
+    dataset = _load(generated.paths["joint"])
+    start = dataset.meta.episodes[1]["dataset_from_index"]
+    world = make_world(RECIPE)
+    observation, _ = world.reset(seed=int(dataset[start][DEMO_SEED]))
+    np.testing.assert_array_equal(dataset[start]["observation.environment_state"], observation["environment_state"])
+    world.close()
+
+
+def test_same_seed_same_data_whatever_the_workers_and_the_first_space(generated, tmp_path):
+    again = generate(RECIPE, ["erj", "joint"], tmp_path / "again", Progress(disable=True), workers=1)
+    for kind in ("joint", "erj"):
+        assert _table(again.paths[kind]).equals(_table(generated.paths[kind]))
+        stats = [json.loads((each.paths[kind] / "meta/stats.json").read_text()) for each in (again, generated)]
+        assert stats[0] == stats[1]
+    assert not list(tmp_path.glob("*.partial"))
+
+
+def test_a_space_can_be_added_later_and_another_recipe_is_refused(generated):
+    out = generated.paths["joint"].parent
+    before = _table(generated.paths["joint"])
+    more = generate(RECIPE, ["joint", "task"], out, Progress(disable=True), workers=1)
+    assert more.new == ("task",)
+    assert _table(generated.paths["joint"]).equals(before)
+    assert _table(more.paths["task"]).column(LEADER_JOINTS).equals(before.column(LEADER_JOINTS))
+    assert generate(RECIPE, ["task"], out, Progress(disable=True), workers=1).new == ()
+    with pytest.raises(DatasetError, match=r"another recipe's data; asked for is seed 5 instead of 0\."):
+        generate(replace(RECIPE, seed=5), ["joint"], out, Progress(disable=True), workers=1)
+
+
+def test_a_killed_run_resumes_with_what_it_had(generated, tmp_path):
+    out = tmp_path / "lift_cup"
+    command = [sys.executable, "-c", "from er_il.cli import main; main()", "generate", "lift_cup"]
+    demos = tmp_path / "lift_cup.partial" / "demos"
+    with subprocess.Popen([*command, "--episodes", "3", "--spaces", "joint", "--out", str(out)]) as run:
+        while run.poll() is None and not list(demos.glob("*.npz")):
+            time.sleep(0.01)
+        run.kill()
+    assert not out.exists()  # nothing half-written under the final name
+    finished = sorted(demos.glob("*.npz"))
+    demo = Demo.load(finished[0])
+    marked = replace(demo, environment_state=demo.environment_state + 7)  # recognisable, should it be recorded again
+    marked.save(finished[0])
+    resumed = generate(RECIPE, ["joint"], out, Progress(disable=True), workers=1)
+    ours, theirs = _table(resumed.paths["joint"]), _table(generated.paths["joint"])
+    assert ours.drop(["observation.environment_state"]).equals(theirs.drop(["observation.environment_state"]))
+    rows = ours.column(DEMO_SEED).to_numpy() == demo.seed
+    column = [np.stack(table.column("observation.environment_state").to_numpy()) for table in (ours, theirs)]
+    np.testing.assert_array_equal(column[0][rows], column[1][rows] + 7)
+    np.testing.assert_array_equal(column[0][~rows], column[1][~rows])
+    assert not (tmp_path / "lift_cup.partial").exists()
+
+
+def test_an_unfinished_run_of_another_recipe_is_refused(tmp_path):
+    work = tmp_path / "lift_cup.partial"
+    work.mkdir()
+    (work / "recipe.json").write_text(json.dumps(replace(RECIPE, seed=4).to_dict()))
+    with pytest.raises(DatasetError, match="seed 0 instead of 4"):
+        generate(RECIPE, ["joint"], tmp_path / "lift_cup", Progress(disable=True), workers=1)
+
+
+def test_cameras_are_recorded_once_and_shared(tmp_path):
+    recipe = replace(RECIPE.resized(2), cameras=("wrist", "shoulder"), image_size=32)
+    made = generate(recipe, ["joint", "erj"], tmp_path / "seen", Progress(disable=True), workers=1)
+    videos = [sorted(path.rglob("*.mp4")) for path in made.paths.values()]
+    assert len(videos[0]) == 2
+    assert [video.stat().st_ino for video in videos[0]] == [video.stat().st_ino for video in videos[1]]
+    dataset = _load(made.paths["erj"])
+    start = dataset.meta.episodes[1]["dataset_from_index"]
+    world = make_world(recipe)
+    demo = record_demo(world, int(dataset[start][DEMO_SEED]))
+    world.close()
+    assert isinstance(demo, Demo)
+    for step in (0, 40, len(demo) - 1):  # video frames belong to their rows, in the second episode too
+        for camera in recipe.cameras:
+            decoded = dataset[start + step][f"observation.images.{camera}"].numpy().transpose(1, 2, 0) * 255
+            error = [np.abs(decoded - demo.images[camera][near]).mean() for near in (step, (step + 60) % len(demo))]
+            assert error[0] < 10
+            assert error[0] < error[1]
+
+
+def test_wrong_requests(tmp_path):
+    ask = Progress(disable=True)
+    with pytest.raises(UnknownNameError, match="action space 'polar'"):
+        generate(RECIPE, ["polar"], tmp_path / "out", ask, workers=1)
+    with pytest.raises(UnknownNameError, match="action space"):
+        generate(RECIPE, [], tmp_path / "out", ask, workers=1)
+    with pytest.raises(UnknownNameError, match="camera 'elbow'"):
+        generate(replace(RECIPE, cameras=("elbow",)), ["joint"], tmp_path / "out", ask, workers=1)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(DatasetError, match=r"Cannot write to .*file/out: Not a directory"):
+        generate(RECIPE, ["joint"], tmp_path / "file" / "out", ask, workers=1)
+    (tmp_path / "strange" / "joint").mkdir(parents=True)
+    with pytest.raises(DatasetError, match="not written by er-il generate"):
+        generate(RECIPE, ["joint"], tmp_path / "strange", ask, workers=1)
+
+
+def test_a_full_folder_is_one_clear_error(tmp_path):
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, limits[1]))  # no file may grow longer, as on a full disk
+    try:
+        with pytest.raises(DatasetError, match=r"Cannot write to .*out: File too large"):
+            generate(RECIPE, ["joint"], tmp_path / "out", Progress(disable=True), workers=1)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert not (tmp_path / "out").exists()
+
+
+def test_lerobot_s_own_viewer_shows_it_headless(generated, tmp_path):
+    from lerobot.scripts.lerobot_dataset_viz import visualize_dataset
+
+    dataset = LeRobotDataset("er_il/test", root=generated.paths["erj"], episodes=[1], video_backend="pyav")
+    saved = visualize_dataset(dataset, 1, save=True, output_dir=tmp_path)
+    assert saved is not None
+    assert saved.stat().st_size > 10_000
