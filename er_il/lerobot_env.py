@@ -55,7 +55,12 @@ class ErIlEnvConfig(EnvConfig):
 
     @property
     def gym_kwargs(self) -> dict[str, Any]:
-        return {"arm": self.arm, "cameras": tuple(self.cameras), "image_size": self.image_size}
+        return {
+            "arm": self.arm,
+            "cameras": tuple(self.cameras),
+            "image_size": self.image_size,
+            "render_mode": "rgb_array",  # the stock commands film some episodes
+        }
 
     def make(self) -> DecodingEnv:
         """Make one environment."""
@@ -104,8 +109,9 @@ def _features(env: gymnasium.Env[Any, Any]) -> tuple[dict[str, PolicyFeature], d
     ]:
         features[key] = PolicyFeature(kind, observation[key].shape or ())
         names[key] = name
-    pixels = observation.spaces.get("pixels", {})
+    pixels = observation.spaces.get("pixels", gymnasium.spaces.Dict())
+    assert isinstance(pixels, gymnasium.spaces.Dict)
     for camera, space in pixels.items():
-        features[f"pixels/{camera}"] = PolicyFeature(FeatureType.VISUAL, space.shape)
+        features[f"pixels/{camera}"] = PolicyFeature(FeatureType.VISUAL, space.shape or ())
         names[f"pixels/{camera}"] = f"{OBS_IMAGES}.{camera}"
     return features, names

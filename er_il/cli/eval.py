@@ -1,0 +1,61 @@
+"""``er-il eval``: roll a trained policy out and count."""
+
+from pathlib import Path
+
+from tyro.conf import Positional
+
+
+def eval(
+    policy: Positional[Path],
+    *,
+    task: str,
+    decoder: str,
+    episodes: int = 50,
+    seed: int = 1000,
+    on_invalid: str = "best_effort",
+    out: Path | None = None,
+) -> None:
+    """Roll a trained policy out through a decoder, on initial states that no demonstration had.
+
+    Args:
+        policy: Folder of the policy: a training's output, or the pretrained model in it.
+        task: Task, such as reach_cup.
+        decoder: joint, task-nearest, task-posture, erj.
+        episodes: Number of rollouts.
+        seed: Seed of the first; the same seeds give every decoder the same initial states.
+        on_invalid: What the arm does with an action that cannot be decoded: best_effort, hold, stop.
+        out: Folder of report.json and episodes.csv; outputs/eval/<task>/<decoder> if omitted.
+    """
+    from rich.console import Console
+
+    from er_il.cli.progress import make_progress
+    from er_il.evaluation import evaluate, write_cells
+    from er_il.provenance import provenance
+    from er_il.training import pretrained
+
+    console = Console()
+    with make_progress(console) as progress:
+        bar = progress.add_task(f"{task}, {decoder}", total=episodes)
+        cell = evaluate(
+            pretrained(policy),
+            task,
+            decoder,
+            episodes=episodes,
+            seed=seed,
+            on_invalid=on_invalid,
+            advance=lambda count: progress.update(bar, advance=count),
+        )
+    folder = out or Path("outputs/eval") / task / decoder
+    meta = provenance() | {"policy": str(policy), "first_seed": seed, "episodes": episodes, "on_invalid": on_invalid}
+    write_cells([cell], meta, folder)
+    report = cell.report()
+    low, high = report["interval"]
+    failures = ", ".join(f"{name} {count}" for name, count in report["failures"].items()) or "none"
+    console.print(
+        f"Success {cell.successes}/{episodes} (exact 95 % interval {low:.1%} to {high:.1%})\n"
+        f"Failures: {failures}\n"
+        f"Invalid actions: {report['invalid_rate']:.1%}; largest joint step {report['max_joint_step']:.3f} rad; "
+        f"decode p50 {report['decode_p50_ms']:.2f} ms, p99 {report['decode_p99_ms']:.2f} ms\n"
+        f"{folder / 'report.json'}",
+        highlight=False,
+    )

@@ -1,0 +1,62 @@
+"""``er-il train``: train a policy with LeRobot's own command."""
+
+from pathlib import Path
+
+from tyro.conf import Positional
+
+
+def train(
+    task: Positional[str],
+    space: Positional[str],
+    *,
+    steps: int = 1000,
+    seed: int = 0,
+    dataset: Path | None = None,
+    config: Path | None = None,
+    out: Path | None = None,
+) -> None:
+    """Train a policy on a dataset's training episodes; prints the stock command it runs.
+
+    Interrupted, the same command resumes from the last checkpoint.
+
+    Args:
+        task: Task, such as reach_cup.
+        space: Action space of the dataset: joint, task, erj.
+        steps: Training steps.
+        seed: Seed of the training.
+        dataset: Folder of the dataset; datasets/<task>/<space> if omitted.
+        config: Configuration of the training; configs/act_<space>.yaml if omitted.
+        out: Folder of the policy; policies/<task>/<space> if omitted.
+    """
+    import shlex
+    import subprocess
+    import sys
+
+    from er_il.errors import UnknownNameError
+    from er_il.spaces import SPACES
+    from er_il.tasks import task_id
+    from er_il.training import Training, default_config, executable
+
+    task_id(task)
+    if space not in SPACES:
+        raise UnknownNameError("action space", space, SPACES)
+    training = Training(
+        task=task,
+        space=space,
+        dataset=dataset or Path("datasets") / task / space,
+        out=out or Path("policies") / task / space,
+        config=config or default_config(space),
+        steps=steps,
+        seed=seed,
+    )
+    if training.finished:
+        print(
+            f"{training.policy}: trained already, for {training.done_steps} steps. Remove {training.out} to start anew."
+        )
+        return
+    training.clear()
+    print(shlex.join(training.command), flush=True)
+    finished = subprocess.run(executable(training.command))
+    if finished.returncode:
+        sys.exit(finished.returncode)
+    print(training.policy)
