@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from er_il.errors import ErIlError, UnknownNameError
 
@@ -30,11 +31,11 @@ class View:
 
     def add(self, spec: mujoco.MjSpec) -> None:
         """Add the camera to a spec."""
-        back = np.subtract(self.position, self.target)
+        back = np.subtract(self.position, self.target)  # a MuJoCo camera looks along its own -z
         right = np.cross(self.up, back)
-        above = np.cross(back, right)
-        camera = spec.body(self.body).add_camera(name=self.name, pos=self.position, fovy=self.fovy)
-        camera.alt.xyaxes = (*(right / np.linalg.norm(right)), *(above / np.linalg.norm(above)))
+        axes = np.column_stack([right, np.cross(back, right), back])
+        x, y, z, w = Rotation.from_matrix(axes / np.linalg.norm(axes, axis=0)).as_quat()
+        spec.body(self.body).add_camera(name=self.name, pos=self.position, quat=(w, x, y, z), fovy=self.fovy)
 
 
 SHOWCASE = "showcase"
@@ -44,7 +45,7 @@ VIEWS = (
     # Over the robot's left shoulder into the workspace.
     View("shoulder", "world", (-0.10, 0.50, 1.20), (0.60, 0.0, 0.55), 58),
     # For people: the whole scene from the right.
-    View(SHOWCASE, "world", (-0.75, -1.45, 1.35), (0.33, 0.0, 0.5), 44),
+    View(SHOWCASE, "world", (-0.12, -1.55, 1.05), (0.30, 0.0, 0.47), 44),
 )
 
 

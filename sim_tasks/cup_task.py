@@ -87,7 +87,7 @@ class CupTask(ArmTask):
     def _times_out(self) -> str:
         return "missed_grasp" if self.gripper_opening < CLOSED and not self._held() else "timeout"
 
-    def _hand(self, position: Sequence[float]) -> np.ndarray:
+    def _hand(self, position: np.ndarray) -> np.ndarray:
         """T_base_ee (4, 4) of a hand that points forward and down, the fingers level."""
         approach = np.array([np.cos(PITCH), 0.0, -np.sin(PITCH)])
         level = np.array([0.0, 1.0, 0.0])

@@ -78,8 +78,8 @@ class Cabinet:
     ceiling: float = 0.76
     wall: float = 0.018
 
-    def add(self, spec: mujoco.MjSpec, name: str, material: str, inside: str) -> mujoco.MjsBody:
-        """Add the cabinet, fixed to the world."""
+    def add(self, spec: mujoco.MjSpec, name: str, material: str, inside: str, sides: str) -> mujoco.MjsBody:
+        """Add the cabinet, fixed to the world; its back has the ``inside`` material."""
         body = spec.worldbody.add_body(name=name)
         half_depth, half_width, t = self.depth / 2, self.inner_width / 2 + self.wall, self.wall / 2
         x = self.front + half_depth
@@ -88,8 +88,8 @@ class Cabinet:
             "base": ((half_depth, half_width, self.floor / 2 - t), (x, 0, self.floor / 2 - t), material),
             "floor": ((half_depth, half_width, t), (x, 0, self.floor - t), material),
             "ceiling": ((half_depth, half_width, t), (x, 0, self.ceiling + t), material),
-            "left": ((half_depth, t, half_height), (x, half_width - t, middle), material),
-            "right": ((half_depth, t, half_height), (x, -half_width + t, middle), material),
+            "left": ((half_depth, t, half_height), (x, half_width - t, middle), sides),
+            "right": ((half_depth, t, half_height), (x, -half_width + t, middle), sides),
             "back": ((t, half_width - 2 * t, half_height), (x + half_depth - t, 0, middle), inside),
         }
         for board, (size, position, look) in boards.items():
@@ -102,8 +102,8 @@ class Wall:
     """An upright panel across the robot's back."""
 
     x: float = -0.20  # of its face
-    width: float = 1.1
-    height: float = 1.0
+    width: float = 0.7
+    height: float = 0.95
     thickness: float = 0.02
 
     def add(self, spec: mujoco.MjSpec, name: str, material: str) -> mujoco.MjsBody:

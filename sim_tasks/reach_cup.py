@@ -32,6 +32,6 @@ class ReachCup(CupTask):
     )
 
     def _build(self, spec: mujoco.MjSpec) -> None:
-        self.cabinet.add(spec, "cabinet", "wood", "dark_wood")
+        self.cabinet.add(spec, "cabinet", "wood", inside="dark_wood", sides="glass")
         Wall().add(spec, "wall", "plaster")
         self.cup.add(spec, CUP, (*self.centre, self.surface), "copper")

@@ -127,6 +127,7 @@ def _mujoco_urdf(arm: Arm) -> str:
         fusestatic="false",
         strippath="true",
         balanceinertia="true",
+        discardvisual="false",  # else materials and the tasks' visual shapes are dropped too
     )
     return ET.tostring(root, encoding="unicode")
 

@@ -1,0 +1,142 @@
+"""The worlds: contract with Gymnasium, physics, demonstrations, judgement."""
+
+from collections.abc import Iterator
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import sim_tasks
+from er_il.errors import ErIlError, UnknownNameError
+from er_il.kinematics import kinematics_of
+from sim_tasks.arm_task import ArmTask
+
+IDS = [f"sim_tasks/{task.__name__}-v0" for task in sim_tasks.TASKS]
+DEMOS = 20  # a task; the benchmark of 100 is a command (README)
+
+
+def make(task_id: str, **kwargs: object) -> tuple[gymnasium.Env, ArmTask]:
+    env = gymnasium.make(task_id, **kwargs)
+    assert isinstance(env.unwrapped, ArmTask)
+    return env, env.unwrapped
+
+
+def play(env: gymnasium.Env, actions: Iterator[np.ndarray]) -> dict:
+    info: dict = {}
+    for action in actions:
+        _, _, terminated, truncated, info = env.step(action.astype(np.float32))
+        if terminated or truncated:
+            break
+    return info
+
+
+@pytest.mark.parametrize("task_id", IDS)
+def test_passes_gymnasiums_checker_with_and_without_cameras(task_id: str) -> None:
+    check_env(gymnasium.make(task_id).unwrapped, skip_render_check=True)
+    env, world = make(task_id, cameras=("wrist", "shoulder"), image_size=48, render_mode="rgb_array")
+    check_env(world)
+    pixels = env.reset(seed=0)[0]["pixels"]
+    assert {name: image.shape for name, image in pixels.items()} == {"wrist": (48, 48, 3), "shoulder": (48, 48, 3)}
+    assert all(image.std() > 10 for image in pixels.values()), "the cameras look at nothing"
+    env.close()
+
+
+@pytest.mark.parametrize("task_id", IDS)
+def test_same_seed_same_trajectory_and_another_seed_another(task_id: str) -> None:
+    def trajectory(seed: int) -> np.ndarray:
+        env, world = make(task_id)
+        observations = [env.reset(seed=seed)[0]]
+        for action, _ in zip(world.leader(seed), range(40), strict=False):
+            observations.append(env.step(action.astype(np.float32))[0])
+        return np.array([np.concatenate([o["agent_pos"], o["environment_state"]]) for o in observations])
+
+    assert np.array_equal(trajectory(3), trajectory(3))
+    assert not np.allclose(trajectory(3)[:20], trajectory(4)[:20])
+
+
+@pytest.mark.parametrize("task_id", IDS)
+def test_demonstrations_succeed_within_velocity_limits_and_tracked_within_5_mm(task_id: str) -> None:
+    env, world = make(task_id)
+    kinematics = kinematics_of(world.arm)
+    successes, worst = 0, 0.0
+    for seed in range(DEMOS):
+        env.reset(seed=seed)
+        start = world.joint_positions
+        actions = np.array(list(world.leader(seed)))
+        speed = np.abs(np.diff(np.vstack([start, actions[:, :-1]]), axis=0)) * world.metadata["render_fps"]
+        assert np.all(speed <= world.arm.velocity)
+        info: dict = {}
+        for action in actions:
+            _, _, terminated, _, info = env.step(action.astype(np.float32))
+            worst = max(worst, kinematics.pose_error(kinematics.fk(action[:-1]), world.joint_positions)[0])
+            if terminated:
+                break
+        successes += info["is_success"]
+    assert successes == DEMOS
+    assert worst < 0.005
+
+
+def test_reach_cup_needs_a_real_change_of_elbow() -> None:
+    env, world = make("sim_tasks/ReachCup-v0")
+    env.reset(seed=0)
+    base_joint = np.array(list(world.leader(0)))[:, 0]
+    assert np.ptp(base_joint) > 0.8
+
+
+def test_the_elbow_cannot_stay_up_or_out() -> None:
+    """The demo's hand path with the elbow kept at its start, or kept up, ends in a collision."""
+    env, world = make("sim_tasks/ReachCup-v0")
+    kinematics = kinematics_of(world.arm)
+    for elbow in (1.2, 0.1):
+        env.reset(seed=0)
+        actions, q = np.array(list(world.leader(0))), world.joint_positions
+        path = []
+        for action in actions:
+            ik = kinematics.solve(kinematics.fk(action[:-1]), q, fixed={world.arm.joints[0]: elbow})
+            q = ik.q
+            path.append(np.append(q, action[-1]))
+        assert play(env, iter(path))["failure"] == "collision"
+
+
+def test_hitting_the_cabinet_is_a_collision_and_tipping_the_cup_knocks_it_over() -> None:
+    env, world = make("sim_tasks/ReachCup-v0")
+    env.reset(seed=0)
+    into_the_front = np.append(world.joint_positions, 1.0)
+    into_the_front[1] += 1.2
+    assert play(env, iter([into_the_front] * 60))["failure"] == "collision"
+
+    env, world = make("sim_tasks/LiftCup-v0")
+    env.reset(seed=0)
+    actions = list(world.leader(0))
+    closed = [np.append(action[:-1], 0.0) for action in actions]  # a fist pushes the stem
+    assert play(env, iter(closed))["failure"] == "knocked_over"
+
+
+def test_a_hand_that_never_closes_times_out_and_one_that_closes_beside_misses() -> None:
+    env, world = make("sim_tasks/LiftCup-v0")
+    env.reset(seed=0)
+    still = np.append(world.joint_positions, 1.0)
+    assert play(env, iter([still] * 1000))["failure"] == "timeout"
+    env.reset(seed=0)
+    fist = np.append(world.joint_positions, 0.0)
+    assert play(env, iter([fist] * 1000))["failure"] == "missed_grasp"
+
+
+def test_objects_can_be_placed_and_quaternions_do_not_jump() -> None:
+    env, world = make("sim_tasks/LiftCup-v0")
+    observation, _ = env.reset(seed=0, options={"state": {"cup": (0.60, 0.01, 0.5)}})
+    assert observation["environment_state"][:2] == pytest.approx([0.60, 0.01])
+    quaternions = [observation["agent_pos"][-4:]]
+    for action in world.leader(0):
+        quaternions.append(env.step(action.astype(np.float32))[0]["agent_pos"][-4:])
+    assert np.max(np.linalg.norm(np.diff(quaternions, axis=0), axis=1)) < 0.2
+
+
+def test_wrong_names_list_the_valid_ones() -> None:
+    with pytest.raises(UnknownNameError, match="Unknown camera 'belly'. Valid: .*wrist"):
+        gymnasium.make(IDS[0], cameras=("belly",))
+    with pytest.raises(UnknownNameError, match="Unknown object 'mug'. Valid: cup."):
+        gymnasium.make(IDS[0]).reset(options={"state": {"mug": (0, 0, 0)}})
+    with pytest.raises(ErIlError, match="Image size 0"):
+        gymnasium.make(IDS[0], cameras=("wrist",), image_size=0)
