@@ -1,0 +1,401 @@
+import json
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from chains import chain_arm, write_chain
+
+import er_il
+from er_il import ActionSpace, Arm, Decoded, Status, from_spec, make_action_space
+from er_il.errors import ArmError, ShapeError, SpecError, UnknownNameError
+from er_il.kinematics import LIMIT_MARGIN
+
+PANDA = Arm.preset("panda")
+EXACT = 1e-3  # [rad] a decode that misses the joints by more has not returned them
+SINGULAR = 0.03  # a smallest singular value below this explains a miss
+
+
+@dataclass(frozen=True)
+class RoundTrip:
+    """One configuration encoded, and decoded from a seed nearby."""
+
+    q: np.ndarray
+    seed: np.ndarray
+    decoded: Decoded
+    conditioning: float  # smallest singular value of what the action fixes, by the joints it leaves to IK
+
+    @property
+    def exact(self) -> bool:
+        return bool(np.abs(self.decoded.q - self.q).max() <= EXACT)
+
+
+def conditioning(space: ActionSpace, q: np.ndarray) -> float:
+    jacobian = space.kinematics.jacobian(q)
+    if space.kind == "era":
+        jacobian = np.vstack([jacobian, space.kinematics.arm_angle.slope(q)[2]])
+    if space.kind == "erj":
+        jacobian = jacobian[:, [joint not in space.arm.redundant for joint in space.arm.joints]]
+    return float(np.linalg.svd(jacobian, compute_uv=False)[-1])
+
+
+def round_trips(space: ActionSpace, count: int, seed_error: float = 0.1, seed: int = 0) -> list[RoundTrip]:
+    arm, rng = space.arm, np.random.default_rng(seed)
+    trips = []
+    for _ in range(count):
+        q = rng.uniform(arm.lower, arm.upper)
+        start = np.clip(q + rng.uniform(-seed_error, seed_error, arm.dof), arm.lower, arm.upper)
+        trips.append(RoundTrip(q, start, space.decode(space.encode(q, 0.25), start), conditioning(space, q)))
+    return trips
+
+
+def at_limit(arm: Arm, q: np.ndarray) -> bool:
+    return bool(np.any((q - arm.lower < LIMIT_MARGIN) | (arm.upper - q < LIMIT_MARGIN)))
+
+
+def assert_returns_joints(space: ActionSpace, trips: list[RoundTrip], share: float) -> None:
+    exact = [trip for trip in trips if trip.exact]
+    assert len(exact) / len(trips) >= share
+    assert all(trip.decoded.status is Status.OK for trip in exact)
+    for trip in trips:
+        if not trip.exact:
+            explained = trip.decoded.status is not Status.OK or at_limit(space.arm, trip.decoded.q)
+            assert explained or trip.conditioning < SINGULAR
+        if trip.decoded.status is Status.OK:
+            assert max(space.kinematics.pose_error(space.fk(trip.q), trip.decoded.q)) < 1e-3
+
+
+# ---------------------------------------------------------------- the leading property
+
+
+def test_joint_space_returns_the_joints_always():
+    for trip in round_trips(make_action_space("joint", PANDA), 100):
+        np.testing.assert_array_equal(trip.decoded.q, trip.q)
+        assert trip.decoded.status is Status.OK and trip.decoded.gripper == 0.25
+
+
+@pytest.mark.parametrize("rotation", ["quat", "rot6d"])
+@pytest.mark.parametrize(("kind", "seed_error", "share"), [("erj", 0.1, 0.98), ("era", 0.1, 0.98), ("erj", 0.03, 0.99)])
+def test_er_spaces_return_the_joints(kind, seed_error, share, rotation):
+    space = make_action_space(kind, PANDA, rotation=rotation)
+    assert_returns_joints(space, round_trips(space, 500, seed_error), share)
+
+
+@pytest.mark.parametrize("kind", ["erj", "era"])
+def test_er_spaces_return_the_joints_wherever_the_arm_is_well_conditioned(kind):
+    space = make_action_space(kind, PANDA)
+    trips = [trip for trip in round_trips(space, 400, seed=1) if trip.conditioning >= SINGULAR]
+    assert len(trips) > 100
+    assert all(trip.exact for trip in trips)
+
+
+def test_what_erj_misses_has_a_second_solution_nearer_the_seed():
+    """So no decoder that knows only the action and the seed could have told: the share's ceiling."""
+    space = make_action_space("erj", PANDA)
+    missed = [trip for trip in round_trips(space, 1500, seed=2) if not trip.exact]
+    nearer = [np.linalg.norm(t.decoded.q - t.seed) <= np.linalg.norm(t.q - t.seed) for t in missed]
+    assert missed and np.mean(nearer) >= 0.8
+
+
+@pytest.mark.parametrize("posture", [None, PANDA.home])
+def test_task_space_returns_the_pose_and_not_the_joints(posture):
+    space = make_action_space("task", PANDA, posture=posture)
+    rng = np.random.default_rng(0)
+    off = []
+    for _ in range(150):
+        q = PANDA.home + rng.uniform(-0.5, 0.5, 7)
+        decoded = space.decode(space.encode(q), q + rng.uniform(-0.1, 0.1, 7))
+        if decoded.status is Status.OK:
+            assert max(space.kinematics.pose_error(space.fk(q), decoded.q)) < 1e-6
+            off.append(np.abs(decoded.q - q).max())
+    assert len(off) >= 148
+    assert np.median(off) > 0.01
+
+
+@pytest.mark.parametrize("joints", [7, 8, 9])
+def test_erj_on_random_chains(tmp_path, joints):
+    for seed in range(3):
+        space = make_action_space("erj", chain_arm(tmp_path, joints, seed))
+        assert space.dim == 3 + 4 + (joints - 6) + 1
+        assert_returns_joints(space, round_trips(space, 100, 0.05, seed), 0.93)
+
+
+# ---------------------------------------------------------------- shapes, names, batches
+
+
+def test_dimensions_are_those_of_the_paper():
+    dims = {kind: make_action_space(kind, PANDA).dim for kind in ("joint", "task", "erj", "era")}
+    assert dims == {"joint": 8, "task": 8, "erj": 9, "era": 9}
+    names = make_action_space("erj", PANDA, rotation="rot6d").names
+    assert names[:3] == ("ee.x", "ee.y", "ee.z") and names[-2:] == ("panda_joint1.pos", "gripper")
+    assert len(names) == 11
+
+
+@pytest.mark.parametrize("kind", ["joint", "task", "erj", "era"])
+def test_a_trajectory_encodes_like_its_rows_up_to_the_turn(kind):
+    space = make_action_space(kind, PANDA)
+    q = PANDA.home + np.linspace(0, 0.3, 6)[:, None] * np.ones(7)
+    batch = space.encode(q, np.linspace(0, 1, 6))
+    assert batch.shape == (6, space.dim)
+    np.testing.assert_allclose(batch, [space.encode(row, g) for row, g in zip(q, np.linspace(0, 1, 6), strict=True)])
+
+
+def test_wrong_shapes_are_refused_with_what_was_expected():
+    space = make_action_space("joint", PANDA)
+    with pytest.raises(ShapeError, match=r"^Joint angles has shape \(6,\), expected \(7,\) or \(N, 7\)\.$"):
+        space.encode(np.zeros(6))
+    with pytest.raises(ShapeError, match=r"^A joint action has shape \(9,\), expected \(8,\): panda_joint1\.pos, "):
+        space.decode(np.zeros(9), PANDA.home)
+    with pytest.raises(ShapeError, match=r"^The seed has shape \(8,\), expected \(7,\)\.$"):
+        space.decode(np.zeros(8), np.zeros(8))
+
+
+def test_unknown_space_names_the_valid_ones():
+    with pytest.raises(UnknownNameError, match=r"^Unknown action space 'ik'\. Valid: joint, task, erj, era\.$"):
+        make_action_space("ik", PANDA)
+
+
+# ---------------------------------------------------------------- what policies get wrong
+
+
+@pytest.mark.parametrize("kind", ["joint", "task", "erj", "era"])
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_what_is_not_finite_is_invalid_and_keeps_the_arm(kind, value):
+    space = make_action_space(kind, PANDA)
+    for index in range(space.dim):
+        action = space.encode(PANDA.home + 0.2, 0.5)
+        action[index] = value
+        decoded = space.decode(action, PANDA.home)
+        assert decoded.status is Status.INVALID
+        np.testing.assert_array_equal(decoded.q, PANDA.home)
+        assert 0.0 <= decoded.gripper <= 1.0
+
+
+@pytest.mark.parametrize(("rotation", "numbers"), [("quat", slice(3, 7)), ("rot6d", slice(3, 9))])
+def test_a_zero_rotation_is_invalid(rotation, numbers):
+    space = make_action_space("erj", PANDA, rotation=rotation)
+    action = space.encode(PANDA.home)
+    action[numbers] = 0.0
+    assert space.decode(action, PANDA.home).status is Status.INVALID
+
+
+def test_quaternion_twins_and_lengths_decode_alike():
+    space = make_action_space("erj", PANDA)
+    action = space.encode(PANDA.home + 0.1)
+    expected = space.decode(action, PANDA.home).q
+    for factor in (-1.0, 3.0, -0.01):
+        twin = action.copy()
+        twin[3:7] *= factor
+        np.testing.assert_allclose(space.decode(twin, PANDA.home).q, expected, atol=1e-6)
+
+
+def test_the_gripper_is_clipped():
+    space = make_action_space("joint", PANDA)
+    assert [space.decode(space.encode(PANDA.home, g), PANDA.home).gripper for g in (-2.0, 0.3, 4.0)] == [0.0, 0.3, 1.0]
+
+
+@pytest.mark.parametrize("kind", ["task", "erj", "era"])
+def test_an_unreachable_pose_is_said_and_stays_within_limits(kind):
+    space = make_action_space(kind, PANDA)
+    action = space.encode(PANDA.home)
+    action[:3] = [1.5, 0.0, 0.3]
+    decoded = space.decode(action, PANDA.home)
+    assert decoded.status in (Status.UNREACHABLE, Status.LIMIT, Status.NOT_CONVERGED)
+    assert np.all(decoded.q >= PANDA.lower) and np.all(decoded.q <= PANDA.upper)
+    assert decoded.pos_err > 0.1
+
+
+def test_joint_commands_beyond_the_limits_are_clipped_and_said():
+    space = make_action_space("joint", PANDA)
+    action = space.encode(PANDA.home)
+    action[3] = 5.0
+    decoded = space.decode(action, PANDA.home)
+    assert decoded.status is Status.LIMIT and decoded.q[3] == PANDA.upper[3]
+    erj = make_action_space("erj", PANDA)
+    action = erj.encode(PANDA.home)
+    action[7] = -9.0
+    assert erj.decode(action, PANDA.home).status is Status.LIMIT
+
+
+@pytest.mark.parametrize("kind", ["task", "erj", "era"])
+def test_a_smooth_path_is_followed_without_a_jump(kind):
+    """Twenty circles of the elbow's base joint and the hand: the branch must not flip."""
+    space = make_action_space(kind, PANDA)
+    time = np.linspace(0, 2 * np.pi, 300)[:, None]
+    q = PANDA.home + 0.5 * np.sin(time * np.array([1, 1, 2, 1, 2, 1, 3]) + np.arange(7))
+    at = q[0]
+    largest = 0.0
+    for action in space.encode(q):
+        decoded = space.decode(action, at)
+        assert decoded.status is Status.OK
+        largest = max(largest, float(np.abs(decoded.q - at).max()))
+        at = decoded.q
+    assert largest < 1.5 * np.abs(np.diff(q, axis=0)).max() + 1e-3
+    if kind != "task":
+        np.testing.assert_allclose(at, q[-1], atol=EXACT)
+
+
+def test_seeds_beyond_the_limits_are_pulled_in():
+    space = make_action_space("erj", PANDA)
+    decoded = space.decode(space.encode(PANDA.home), PANDA.home + np.array([0, 0, 0, 0, 0, 9.0, 0]))
+    assert np.all(decoded.q <= PANDA.upper)
+
+
+# ---------------------------------------------------------------- ERA
+
+
+def test_the_arm_angle_is_zero_at_the_top_and_follows_the_equation():
+    kinematics = make_action_space("era", PANDA).kinematics
+    circle = kinematics.arm_angle.circle(PANDA.home)
+    assert np.isclose(circle.angle, 0.0, atol=1e-9)
+    angles = np.linspace(-np.pi, np.pi, 73)
+    heights = [circle.elbow(angle)[2] for angle in angles]
+    assert angles[np.argmax(heights)] == 0.0
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        q = rng.uniform(PANDA.lower, PANDA.upper)
+        elbow = kinematics.frame_pose(q, "panda_link4")[:3, 3]
+        circle = kinematics.arm_angle.circle(q)
+        np.testing.assert_allclose(circle.elbow(circle.angle), elbow, atol=1e-9)
+
+
+def test_the_slope_of_the_arm_angle_is_its_derivative():
+    arm_angle, rng, h = make_action_space("era", PANDA).kinematics.arm_angle, np.random.default_rng(1), 1e-6
+    for _ in range(10):
+        q = rng.uniform(PANDA.lower, PANDA.upper)
+        _, radius, slope = arm_angle.slope(q)
+        ahead, behind = arm_angle.along(q + h * np.eye(7)), arm_angle.along(q - h * np.eye(7))
+        np.testing.assert_allclose(slope, radius * (ahead - behind) / (2 * h), atol=1e-6)
+
+
+def test_the_commanded_arm_angle_is_reached_although_the_wrist_moves_with_it():
+    space = make_action_space("era", PANDA)
+    action = space.encode(PANDA.home)
+    wrists = []
+    for phi in np.radians([-40, -20, 20, 40]):
+        decoded = space.decode(np.concatenate([action[:7], [phi, 1.0]]), PANDA.home)
+        assert decoded.status is Status.OK
+        circle = space.kinematics.arm_angle.circle(decoded.q)
+        assert np.isclose(circle.angle, phi, atol=1e-3)
+        assert max(space.kinematics.pose_error(space.fk(PANDA.home), decoded.q)) < 1e-3
+        wrists.append(space.kinematics.frame_pose(decoded.q, "panda_link6")[:3, 3])
+    assert np.ptp(wrists, axis=0).max() > 0.01
+
+
+def test_an_arm_angle_out_of_reach_is_said():
+    space = make_action_space("era", PANDA)
+    action = space.encode(PANDA.home)
+    action[7] = np.pi  # elbow straight down: the Panda's limits forbid it here
+    decoded = space.decode(action, PANDA.home)
+    assert decoded.status is not Status.OK
+
+
+def test_the_arm_angle_is_continuous_past_half_a_turn_and_any_turn_decodes():
+    space = make_action_space("era", PANDA)
+    rng = np.random.default_rng(0)
+    phi = np.linspace(np.radians(150), np.radians(210), 61)
+    q = _with_arm_angle(space, phi, rng)
+    encoded = space.encode(q)[:, 7]
+    np.testing.assert_allclose(np.diff(encoded), np.diff(phi), atol=2e-3)
+    action = space.encode(q[20])
+    for turn in (-2, 1, 3):
+        other = action.copy()
+        other[7] += 2 * np.pi * turn
+        np.testing.assert_allclose(space.decode(other, q[20] + 0.01).q, q[20], atol=EXACT)
+
+
+def _with_arm_angle(space: ActionSpace, phi: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """A joint path through arm angles around half a turn, at whatever pose allows it."""
+    for _ in range(500):
+        q = rng.uniform(PANDA.lower, PANDA.upper)
+        path = []
+        for angle in phi:
+            ik = space.kinematics.solve(space.fk(q), path[-1] if path else q, arm_angle=float(angle))
+            if ik.status is not Status.OK or (path and np.abs(ik.q - path[-1]).max() > 0.2):
+                break
+            path.append(ik.q)
+        if len(path) == len(phi):
+            return np.array(path)
+    raise AssertionError("no pose of the Panda lets its elbow pass the lowest point")
+
+
+def test_a_vertical_axis_is_counted_from_the_base_frames_x():
+    circle = er_il.arm_angle.ElbowCircle.through(np.zeros(3), np.array([0.1, 0.1, 0.3]), np.array([0.0, 0.0, 0.6]))
+    assert np.isclose(circle.angle, np.radians(45))
+    np.testing.assert_allclose(circle.elbow(circle.angle), [0.1, 0.1, 0.3])
+
+
+def test_era_needs_frames_and_one_redundant_joint(tmp_path):
+    with pytest.raises(ArmError, match=r"^chain7 names no shoulder, elbow and wrist links, .* give angle_frames"):
+        make_action_space("era", chain_arm(tmp_path, 7))
+    with pytest.raises(ArmError, match=r"^chain8 has 2 redundant joints; one arm angle fixes only one. Use erj"):
+        make_action_space("era", chain_arm(tmp_path, 8))
+
+
+# ---------------------------------------------------------------- arms without redundancy, specs
+
+
+@pytest.mark.parametrize("kind", ["erj", "era"])
+def test_arms_without_redundancy_get_joint_and_task_only(tmp_path, kind):
+    arm = chain_arm(tmp_path, 6)
+    with pytest.raises(ArmError, match=r"^chain6 has 6 joints and so no redundancy: .* Use joint or task"):
+        make_action_space(kind, arm)
+    assert make_action_space("task", arm).dim == 8
+    assert make_action_space("joint", arm).dim == 7
+
+
+@pytest.mark.parametrize("kind", ["joint", "task", "erj", "era"])
+@pytest.mark.parametrize("rotation", ["quat", "rot6d"])
+def test_specs_survive_json(kind, rotation):
+    space = make_action_space(kind, PANDA, rotation=rotation)
+    again = from_spec(json.loads(json.dumps(space.spec())))
+    assert again.spec() == space.spec()
+    assert again.names == space.names
+    q = PANDA.home + 0.1
+    np.testing.assert_allclose(again.encode(q), space.encode(q))
+
+
+def test_a_spec_keeps_the_hemisphere_it_was_made_with():
+    space = make_action_space("task", PANDA)
+    spec = json.loads(json.dumps(space.spec()))
+    spec["hemisphere"] = [-value for value in spec["hemisphere"]]
+    np.testing.assert_allclose(from_spec(spec).encode(PANDA.home)[3:7], -space.encode(PANDA.home)[3:7])
+
+
+def test_specs_of_other_arms_and_broken_specs_are_refused(tmp_path):
+    spec = make_action_space("erj", PANDA).spec()
+    for change, message in [
+        ({"version": 7}, r"^Action spec has version 7; this er_il reads 1\.$"),
+        ({"arm": {**spec["arm"], "redundant": ["panda_joint3"]}}, "^The action spec is for redundant .*panda_joint3"),
+        ({"arm": {**spec["arm"], "fingerprint": "0"}}, "^The action spec is for fingerprint 0, but the arm 'panda'"),
+        ({"arm": {"name": "panda"}}, "^Action spec has no 'joints'"),
+    ]:
+        with pytest.raises(SpecError, match=message):
+            from_spec({**spec, **change})
+    with pytest.raises(SpecError, match=r"^Action spec has no 'space'"):
+        from_spec({key: value for key, value in spec.items() if key != "space"})
+    with pytest.raises(UnknownNameError, match=r"^Unknown action space 'era9'"):
+        from_spec({**spec, "space": "era9"})
+    with pytest.raises(SpecError, match=r"^The action spec is for joints"):
+        from_spec(spec, chain_arm(tmp_path, 7))
+
+
+def test_joint_order_is_part_of_the_arm(tmp_path):
+    urdf = write_chain(tmp_path / "chain.urdf", 7)
+    names = [f"j{i}" for i in range(1, 8)]
+    straight = make_action_space("erj", Arm.from_urdf(urdf, ee_frame="tool", joints=names))
+    turned = make_action_space("erj", Arm.from_urdf(urdf, ee_frame="tool", joints=names[::-1], redundant=["j1"]))
+    q = np.linspace(-0.7, 0.7, 7)
+    np.testing.assert_allclose(turned.encode(q[::-1]), straight.encode(q))
+    with pytest.raises(SpecError, match=r"^The action spec is for joints"):
+        from_spec(straight.spec(), turned.arm)
+
+
+def test_rotations_are_continuous_along_a_demo_through_half_a_turn():
+    space = make_action_space("erj", PANDA)
+    q = np.tile(PANDA.home, (80, 1))
+    q[:, 6] = np.linspace(PANDA.lower[6], PANDA.upper[6], 80)  # the hand turns by 332 degrees
+    quaternions = space.encode(q)[:, 3:7]
+    assert np.abs(np.diff(quaternions, axis=0)).max() < 0.1
+    np.testing.assert_allclose(
+        [space.decode(a, row).q for a, row in zip(space.encode(q), q, strict=True)], q, atol=EXACT
+    )
