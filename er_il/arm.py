@@ -1,7 +1,6 @@
 """The arm: which joints of which URDF, between which frames, within which limits."""
 
 import hashlib
-import importlib.metadata
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -13,6 +12,8 @@ import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy.typing import ArrayLike, NDArray
 
 from er_il.errors import ArmError, UnknownNameError
+from er_il.panda8 import panda8_urdf
+from er_il.urdf import example_robot_data, kinematic_xml, pinocchio_model
 
 Vector = NDArray[np.float64]
 
@@ -71,6 +72,8 @@ class Arm:
     ) -> "Arm":
         """Read an arm from a URDF file.
 
+        Continuous joints get limits of one turn to either side (see :mod:`er_il.urdf`).
+
         Args:
             urdf: Path of the file. Meshes are not read.
             ee_frame: Link whose pose the action commands.
@@ -87,8 +90,8 @@ class Arm:
             ArmError: the file is unreadable, or joints, frames and limits do not fit together.
         """
         path = Path(urdf)
-        xml = _read_urdf(path)
-        model = pin.buildModelFromXML(xml)
+        xml = kinematic_xml(path)
+        model = pinocchio_model(xml, path.name)
         links = [frame.name for frame in model.frames if frame.type == pin.FrameType.BODY]
         base = base_frame if base_frame is not None else links[0]
         for role, frame in [("base frame", base), ("end-effector frame", ee_frame)]:
@@ -106,8 +109,6 @@ class Arm:
                 f"Movable joints there: {', '.join(chain)}."
             )
         index = [model.joints[model.getJointId(joint)].idx_q for joint in chosen]
-        if not all(model.joints[model.getJointId(joint)].nq == 1 for joint in chosen):
-            raise ArmError(f"{path.name}: continuous joints without limits are not supported; give each a range.")
         lower, upper = model.lowerPositionLimit[index], model.upperPositionLimit[index]
         velocity = model.velocityLimit[index]
         if not (np.all(upper > lower) and np.all(velocity > 0)):
@@ -158,7 +159,7 @@ class Arm:
     @cached_property
     def model_xml(self) -> str:
         """The URDF without meshes, every joint outside the arm fixed at zero."""
-        return _read_urdf(self.urdf, movable=self.joints)
+        return kinematic_xml(self.urdf, movable=self.joints)
 
     @cached_property
     def fingerprint(self) -> str:
@@ -187,26 +188,6 @@ def _frozen(values: ArrayLike) -> Vector:
     return array
 
 
-def _read_urdf(path: Path, movable: Sequence[str] | None = None) -> str:
-    """Return the URDF's text without meshes; joints outside ``movable`` become fixed."""
-    try:
-        root = ET.parse(path).getroot()
-    except OSError as error:
-        raise ArmError(f"Cannot read the URDF {path}: {error.strerror}.") from error
-    except ET.ParseError as error:
-        raise ArmError(f"{path} is not valid XML ({error}).") from error
-    if root.tag != "robot" or root.find("link") is None:
-        raise ArmError(f"{path} is not a URDF: it has no <robot> with links.")
-    for link in root.findall("link"):
-        for shape in link.findall("visual") + link.findall("collision"):
-            link.remove(shape)
-    if movable is not None:
-        for joint in root.findall("joint"):
-            if joint.get("name") not in movable:
-                joint.set("type", "fixed")
-    return ET.tostring(root, encoding="unicode")
-
-
 def _robot_name(xml: str) -> str:
     return ET.fromstring(xml).get("name", "arm")
 
@@ -225,21 +206,7 @@ def _preset(name: str) -> Arm:
     return PRESETS[name]()
 
 
-def example_robot_data(relative: str) -> Path:
-    """Path of a file inside the ``example-robot-data`` package, such as ``panda_description/urdf/panda.urdf``.
-
-    Raises:
-        ArmError: the package is not installed, or has no such file.
-    """
-    suffix = f"example-robot-data/robots/{relative}"
-    try:
-        files = importlib.metadata.files("example-robot-data") or []
-    except importlib.metadata.PackageNotFoundError as error:
-        raise ArmError("The robot models are missing: install the package example-robot-data.") from error
-    for file in files:
-        if str(file).endswith(suffix):
-            return Path(str(file.locate())).resolve()
-    raise ArmError(f"example-robot-data has no file {relative!r}.")
+PANDA_HOME = (0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4)
 
 
 def _panda() -> Arm:
@@ -249,9 +216,31 @@ def _panda() -> Arm:
         base_frame="panda_link0",
         ee_frame="panda_hand_tcp",
         joints=[f"panda_joint{i}" for i in range(1, 8)],
-        home=[0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4],
+        home=PANDA_HOME,
         angle_frames=ArmAngleFrames(shoulder="panda_link2", elbow="panda_link4", wrist="panda_link6"),
     )
 
 
-PRESETS = {"panda": _panda}
+def _panda8() -> Arm:
+    return Arm.from_urdf(
+        panda8_urdf(),
+        name="panda8",
+        base_frame="panda_link0",
+        ee_frame="panda_hand_tcp",
+        joints=["panda_base_joint2", *(f"panda_joint{i}" for i in range(1, 8))],
+        home=(0.0, *PANDA_HOME),
+    )
+
+
+def _xarm7() -> Arm:
+    return Arm.from_urdf(
+        example_robot_data("xarm_description/urdf/xarm7.urdf"),
+        name="xarm7",
+        base_frame="link_base",
+        ee_frame="link_eef",
+        home=[0.0, -0.3, 0.0, 1.2, 0.0, 1.5, 0.0],
+        angle_frames=ArmAngleFrames(shoulder="link2", elbow="link4", wrist="link6"),
+    )
+
+
+PRESETS = {"panda": _panda, "panda8": _panda8, "xarm7": _xarm7}

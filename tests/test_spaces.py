@@ -80,6 +80,13 @@ def test_er_spaces_return_the_joints(kind, seed_error, share, rotation):
     assert_returns_joints(space, round_trips(space, 500, seed_error), share)
 
 
+@pytest.mark.parametrize(("name", "kind"), [("panda8", "erj"), ("xarm7", "erj"), ("xarm7", "era")])
+def test_er_spaces_return_the_joints_of_other_presets(name, kind):
+    space = make_action_space(kind, Arm.preset(name))
+    assert_returns_joints(space, round_trips(space, 300, seed=3), 0.97)
+    assert_returns_joints(space, round_trips(space, 300, 0.03, seed=4), 0.98)
+
+
 @pytest.mark.parametrize("kind", ["erj", "era"])
 def test_er_spaces_return_the_joints_wherever_the_arm_is_well_conditioned(kind):
     space = make_action_space(kind, PANDA)
@@ -109,6 +116,14 @@ def test_task_space_returns_the_pose_and_not_the_joints(posture):
             off.append(np.abs(decoded.q - q).max())
     assert len(off) >= 148
     assert np.median(off) > 0.01
+
+
+def test_erj_on_continuous_joints(tmp_path):
+    arm = Arm.from_urdf(write_chain(tmp_path / "endless.urdf", 7, kind="continuous"), ee_frame="tool")
+    space = make_action_space("erj", arm)
+    assert_returns_joints(space, round_trips(space, 100, 0.05), 0.93)
+    beyond = np.r_[6.0, np.full(6, 0.4)]  # past half a turn: the seed's turn is kept
+    np.testing.assert_allclose(space.decode(space.encode(beyond), beyond + 0.02).q, beyond, atol=EXACT)
 
 
 @pytest.mark.parametrize("joints", [7, 8, 9])

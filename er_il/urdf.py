@@ -1,0 +1,84 @@
+"""URDF files: finding, reading and simplifying them."""
+
+import importlib.metadata
+import math
+import xml.etree.ElementTree as ET
+from collections.abc import Sequence
+from pathlib import Path
+
+import pinocchio as pin  # pyright: ignore[reportMissingImports]
+
+from er_il.errors import ArmError
+
+TURN = 2.0 * math.pi  # [rad] a continuous joint gets limits of one turn to either side
+
+
+def example_robot_data(relative: str) -> Path:
+    """Path of a file inside the ``example-robot-data`` package, such as ``panda_description/urdf/panda.urdf``.
+
+    Raises:
+        ArmError: the package is not installed, or has no such file.
+    """
+    suffix = f"example-robot-data/robots/{relative}"
+    try:
+        files = importlib.metadata.files("example-robot-data") or []
+    except importlib.metadata.PackageNotFoundError as error:
+        raise ArmError("The robot models are missing: install the package example-robot-data.") from error
+    for file in files:
+        if str(file).endswith(suffix):
+            return Path(str(file.locate())).resolve()
+    raise ArmError(f"example-robot-data has no file {relative!r}.")
+
+
+def parse_urdf(path: Path) -> ET.Element:
+    """Read a URDF's <robot> element.
+
+    Raises:
+        ArmError: the file is unreadable or no URDF.
+    """
+    try:
+        root = ET.parse(path).getroot()
+    except OSError as error:
+        raise ArmError(f"Cannot read the URDF {path}: {error.strerror}.") from error
+    except ET.ParseError as error:
+        raise ArmError(f"{path} is not valid XML ({error}).") from error
+    if root.tag != "robot" or root.find("link") is None:
+        raise ArmError(f"{path} is not a URDF: it has no <robot> with links.")
+    return root
+
+
+def kinematic_xml(path: Path, movable: Sequence[str] | None = None) -> str:
+    """Return what kinematics needs of a URDF, as XML.
+
+    Meshes are left out; joints outside ``movable`` become fixed; a continuous joint becomes a
+    revolute one with limits of one turn to either side, since joint commands need a range.
+    """
+    root = parse_urdf(path)
+    for link in root.findall("link"):
+        for shape in link.findall("visual") + link.findall("collision"):
+            link.remove(shape)
+    for joint in root.findall("joint"):
+        if movable is not None and joint.get("name") not in movable:
+            joint.set("type", "fixed")
+        elif joint.get("type") == "continuous":
+            joint.set("type", "revolute")
+            limit = joint.find("limit")
+            limit = ET.SubElement(joint, "limit") if limit is None else limit
+            limit.attrib.update(lower=str(-TURN), upper=str(TURN))
+            limit.attrib.setdefault("effort", "0")
+            limit.attrib.setdefault("velocity", "0")
+    return ET.tostring(root, encoding="unicode")
+
+
+def pinocchio_model(xml: str, name: str) -> pin.Model:
+    """Build the model of a URDF's text.
+
+    Raises:
+        ArmError: links and joints form no single tree, or a joint lacks what its type needs.
+    """
+    try:
+        return pin.buildModelFromXML(xml)
+    except ValueError as error:
+        raise ArmError(
+            f"{name} describes no single tree of links, or a joint lacks its parent, child or limits."
+        ) from error
