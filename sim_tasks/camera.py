@@ -40,8 +40,8 @@ class View:
 
 SHOWCASE = "showcase"
 VIEWS = (
-    # On the hand, opposite the robot's own flange lights; both fingertips in view.
-    View("wrist", "panda_hand", (-0.075, 0.0, 0.02), (0.0, 0.0, 0.15), 70, up=(-1.0, 0.0, 0.0)),
+    # On the hand, where the Panda carries its camera; both fingertips in view.
+    View("wrist", "panda_hand", (0.075, 0.0, 0.02), (0.0, 0.0, 0.15), 70, up=(1.0, 0.0, 0.0)),
     # Over the robot's left shoulder into the workspace.
     View("shoulder", "world", (-0.10, 0.50, 1.20), (0.60, 0.0, 0.55), 58),
     # For people: the whole scene from the right.

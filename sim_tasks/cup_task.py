@@ -90,7 +90,7 @@ class CupTask(ArmTask):
     def _hand(self, position: np.ndarray) -> np.ndarray:
         """T_base_ee (4, 4) of a hand that points forward and down, the fingers level."""
         approach = np.array([np.cos(PITCH), 0.0, -np.sin(PITCH)])
-        level = np.array([0.0, 1.0, 0.0])
+        level = np.array([0.0, -1.0, 0.0])  # the flange up, as the Panda carries its camera
         T = np.eye(4)
         T[:3, :3] = np.column_stack([np.cross(level, approach), level, approach])
         T[:3, 3] = position

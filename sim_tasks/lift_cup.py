@@ -16,7 +16,7 @@ class LiftCup(CupTask):
     obstacles = ("stand",)
     surface = stand.height
     centre = stand.centre
-    start = (0.0, -0.83, 0.0, -1.95, 0.0, 2.34, -2.36)  # above and in front of the stand, the elbow up
+    start = (0.0, -0.83, 0.0, -1.95, 0.0, 2.34, 0.785)  # above and in front of the stand, the elbow up
     way = (
         ((-0.20, 0.0, 0.04), 0.1),
         ((-0.10, 0.0, 0.01), 0.1),

@@ -14,9 +14,9 @@ FINGER_BODIES = ("panda_leftfinger", "panda_rightfinger")
 FINGER_TRAVEL = 0.04  # [m] each finger, from closed to open
 GRIPPER = "gripper"  # actuator name
 
-# Stiffness [Nm/rad] by a joint's torque limit; critically damped, the servo lags by some 25 ms,
-# so a hand moving at 0.15 m/s follows within 4 mm.
-STIFF, COMPLIANT = 9000.0, 4000.0
+# Stiffness [Nm/rad] by a joint's torque limit; critically damped, the servo lags by some 20 ms,
+# so that the hand follows within 5 mm at demo speed.
+STIFF, COMPLIANT = 12000.0, 6000.0
 ARMATURE = 0.1  # [kg m^2] reflected rotor inertia
 FINGER_KP, FINGER_KV, FINGER_FORCE = 1000.0, 40.0, 35.0  # [N/m], [Ns/m], [N]
 

@@ -108,8 +108,9 @@ def test_hitting_the_cabinet_is_a_collision_and_tipping_the_cup_knocks_it_over()
 
     env, world = make("sim_tasks/LiftCup-v0")
     env.reset(seed=0)
-    actions = list(world.leader(0))
-    closed = [np.append(action[:-1], 0.0) for action in actions]  # a fist pushes the stem
+    x, y = world.object_pose("cup")[:2]
+    closed = [np.append(action[:-1], 0.0) for action in world.leader(0)]
+    env.reset(seed=0, options={"state": {"cup": (x - 0.08, y, 0.0)}})  # in the way of a fist
     assert play(env, iter(closed))["failure"] == "knocked_over"
 
 
