@@ -13,16 +13,19 @@ from er_il.spaces import ActionSpace
 INVALID_ACTION = "invalid_action"  # the failure of an episode that an invalid action stopped
 
 
-class DecodingEnv(gymnasium.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float32]]):
+class DecodingEnv(
+    gymnasium.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float32]], gymnasium.utils.RecordConstructorArgs
+):
     """Wraps a joint-level environment so that its action is an action space's.
 
-    ``info`` gains, at every step, ``decode_status`` (a :class:`er_il.Status` value),
-    ``decode_latency`` [s] and ``joint_step`` [rad], the largest joint change asked for.
+    ``info`` gains, at every step, ``decode_status`` (a :class:`er_il.Status` value) and ``joint_step``
+    [rad], the largest joint change asked for. ``commander.tally`` sums the episode up.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], space: ActionSpace, on_invalid: str = BEST_EFFORT) -> None:
         """Wrap ``env``, whose actions are the arm's n joint targets [rad] and the gripper's opening."""
-        super().__init__(env)
+        gymnasium.utils.RecordConstructorArgs.__init__(self, space=space, on_invalid=on_invalid, _disable_deepcopy=True)
+        gymnasium.Wrapper.__init__(self, env)
         self.space = space
         self.commander = Commander(space, 1.0 / env.metadata["render_fps"], on_invalid)
         self.action_space = gymnasium.spaces.Box(-np.inf, np.inf, (space.dim,), np.float32)
@@ -38,11 +41,7 @@ class DecodingEnv(gymnasium.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.fl
         command = self.commander.command(action, world.joint_positions)
         target = np.append(command.q, command.gripper).astype(np.float32)
         observation, reward, terminated, truncated, info = self.env.step(target)
-        info = info | {
-            "decode_status": str(command.status),
-            "decode_latency": command.latency,
-            "joint_step": command.joint_step,
-        }
+        info = info | {"decode_status": str(command.status), "joint_step": command.joint_step}
         if command.stopped and not info["is_success"]:
             terminated = True
             info["failure"] = INVALID_ACTION

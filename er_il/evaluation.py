@@ -256,20 +256,21 @@ def _rollout(vector: SyncVectorEnv, actor: _Actor, seeds: list[int]) -> list[Epi
     description = vector.get_attr("task_description")[0]
     done = np.zeros(n, dtype=bool)
     success, failure = np.zeros(n, dtype=bool), [""] * n
-    statuses: list[Counter[str]] = [Counter() for _ in range(n)]
-    latencies: list[list[float]] = [[] for _ in range(n)]
-    steps = np.zeros(n)
     while not done.all():
-        action = actor.act(observation, description)[:n]
-        observation, _, terminated, truncated, info = vector.step(action)
+        observation, _, terminated, truncated, info = vector.step(actor.act(observation, description)[:n])
         for i in np.flatnonzero(~done):
-            statuses[i][info["decode_status"][i]] += 1
-            latencies[i].append(float(info["decode_latency"][i]))
-            steps[i] = max(steps[i], info["joint_step"][i])
             success[i] = info["is_success"][i]
             failure[i] = "" if success[i] else info["failure"][i] or TIMEOUT
         done |= terminated | truncated
+    tallies = [commander.tally for commander in vector.get_attr("commander")]
     return [
-        Episode(s, bool(success[i]), failure[i], statuses[i], tuple(latencies[i]), float(steps[i]))
-        for i, s in enumerate(seeds)
+        Episode(
+            seed=seed,
+            success=bool(success[i]),
+            failure=failure[i],
+            statuses=Counter(map(str, tallies[i].statuses.elements())),
+            latencies=tuple(tallies[i].latencies),
+            joint_step=tallies[i].largest_step,
+        )
+        for i, seed in enumerate(seeds)
     ]

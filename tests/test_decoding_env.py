@@ -1,0 +1,84 @@
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+from er_il.decoders import DECODERS, Decoder, decoder
+from er_il.decoding_env import make_decoding_env
+from er_il.errors import UnknownNameError
+from er_il.tasks import task_id, task_names
+
+REACH = task_id("reach_cup")
+
+
+def test_tasks_have_names():
+    assert {"reach_cup", "lift_cup"} <= set(task_names())
+    with pytest.raises(UnknownNameError, match=r"'reach_cap'. Valid: .*reach_cup"):
+        task_id("reach_cap")
+
+
+def test_reports_know_every_space_and_both_decoders_of_task_space():
+    assert {"joint", "erj", "task-nearest", "task-posture"} <= set(DECODERS)
+    assert "task" not in DECODERS
+    with pytest.raises(UnknownNameError, match=r"task-nearest, task-posture"):
+        decoder("task")
+    with pytest.raises(UnknownNameError, match="nearest, posture"):
+        Decoder("task", "random")
+
+
+@pytest.mark.filterwarnings("ignore:.*(Box action space|unwrapped version):UserWarning")
+@pytest.mark.parametrize("name", ["joint", "erj", "task-nearest", "task-posture"])
+def test_it_is_a_gymnasium_environment(name: str):
+    env = make_decoding_env(REACH, DECODERS[name])
+    check_env(env, skip_render_check=True)
+    env.close()
+
+
+def test_encoded_actions_move_the_arm_as_joint_targets_do():
+    plain = gymnasium.make(REACH)
+    encoded = make_decoding_env(REACH, DECODERS["erj"])
+    plain.reset(seed=3)
+    encoded.reset(seed=3)
+    start = plain.unwrapped.joint_positions  # pyright: ignore[reportAttributeAccessIssue]
+    for step in range(1, 15):
+        q = start + 0.01 * step * np.array([-1, 1, 0.5, 0.5, 0, 0, 0.5])
+        plain.step(np.append(q, 0.5).astype(np.float32))
+        _, _, _, _, info = encoded.step(encoded.space.encode(q, 0.5).astype(np.float32))
+        assert info["decode_status"] == "ok"
+        assert info["joint_step"] == pytest.approx(0.01, abs=2e-3)
+    np.testing.assert_allclose(
+        encoded.unwrapped.joint_positions,  # pyright: ignore[reportAttributeAccessIssue]
+        plain.unwrapped.joint_positions,  # pyright: ignore[reportAttributeAccessIssue]
+        atol=2e-3,
+    )
+
+
+def test_a_reset_forgets_the_last_episode():
+    env = make_decoding_env(REACH, DECODERS["joint"], on_invalid="stop")
+    first, _ = env.reset(seed=5)
+    env.step(np.full(8, np.nan, dtype=np.float32))
+    second, _ = env.reset(seed=5)
+    np.testing.assert_array_equal(first["agent_pos"], second["agent_pos"])
+    q = env.unwrapped.joint_positions  # pyright: ignore[reportAttributeAccessIssue]
+    _, _, terminated, _, info = env.step(env.space.encode(q).astype(np.float32))
+    assert not terminated
+    assert info["decode_status"] == "ok"
+
+
+def test_stop_ends_the_episode_as_an_invalid_action():
+    env = make_decoding_env(REACH, DECODERS["erj"], on_invalid="stop")
+    env.reset(seed=0)
+    _, _, terminated, truncated, info = env.step(np.full(9, np.nan, dtype=np.float32))
+    assert terminated and not truncated
+    assert (info["is_success"], info["failure"], info["decode_status"]) == (False, "invalid_action", "invalid")
+
+
+@pytest.mark.parametrize("on_invalid", ["best_effort", "hold"])
+def test_the_arm_keeps_still_while_actions_mean_nothing(on_invalid: str):
+    env = make_decoding_env(REACH, DECODERS["erj"], on_invalid=on_invalid)
+    env.reset(seed=0)
+    start = env.unwrapped.joint_positions  # pyright: ignore[reportAttributeAccessIssue]
+    for _ in range(10):
+        _, _, terminated, _, info = env.step(np.full(9, np.nan, dtype=np.float32))
+        assert info["decode_status"] == "invalid" and not terminated
+    np.testing.assert_allclose(env.unwrapped.joint_positions, start, atol=5e-3)  # pyright: ignore[reportAttributeAccessIssue]
