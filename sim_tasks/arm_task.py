@@ -14,8 +14,10 @@ from er_il.arm import Arm, Vector
 from er_il.errors import UnknownNameError
 from er_il.kinematics import kinematics_of
 from er_il.rotation import Quaternion, make_rotation
+from er_il.scene import POSE_NAMES, Shape
 from sim_tasks.camera import Cameras
 from sim_tasks.contact import contact_force
+from sim_tasks.geometry import world_shapes
 from sim_tasks.leader import Leader
 from sim_tasks.motion import Stretch
 from sim_tasks.robot import FINGER_BODIES, RobotModel
@@ -33,7 +35,7 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
 
     Action: Box(n+1,): joint position targets [rad] and the gripper's opening in [0, 1] (1 open).
     Observation: ``agent_pos`` (n+8,): joint positions [rad], gripper opening, end-effector position
-    [m] and quaternion (x, y, z, w); ``environment_state``: position [m] and quaternion (w, x, y, z)
+    [m] and quaternion (x, y, z, w); ``environment_state``: position [m] and quaternion (x, y, z, w)
     of each object; ``pixels``: a (size, size, 3) uint8 image a camera, if cameras are asked for.
     Every ``info`` has ``is_success`` and ``failure`` (empty while there is none).
     """
@@ -123,7 +125,7 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
     @property
     def environment_state_names(self) -> tuple[str, ...]:
         """Names of ``environment_state``."""
-        return tuple(f"{name}.{part}" for name in self.objects for part in ("x", "y", "z", "qw", "qx", "qy", "qz"))
+        return tuple(f"{name}.{part}" for name in self.objects for part in POSE_NAMES)
 
     @property
     def joint_positions(self) -> Vector:
@@ -141,8 +143,12 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
         return kinematics_of(self.arm).fk(self.joint_positions)
 
     def object_pose(self, name: str) -> np.ndarray:
-        """An object's position [m] and quaternion (w, x, y, z), (7,)."""
-        return self._data.joint(name).qpos.copy()
+        """An object's position [m] and quaternion (x, y, z, w), (7,)."""
+        return self._data.joint(name).qpos[[0, 1, 2, 4, 5, 6, 3]]
+
+    def scene_geometry(self) -> list[Shape]:
+        """The world around the robot as shapes to draw, as of the last reset."""
+        return world_shapes(self._model, self._data, self._robot.bodies, self.objects)
 
     def reset(
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
