@@ -22,42 +22,12 @@ from er_il.demos import Demo, collect, demo_path, make_world
 from er_il.encoding import encode_actions, encode_dataset
 from er_il.errors import DatasetError, UnknownNameError
 from er_il.recipe import Recipe
+from er_il.record import Record
 from er_il.schema import ACTION, DEMO_SEED, ENVIRONMENT_STATE, IMAGES, LEADER_JOINTS, STATE, features
 from er_il.spaces import SPACES, ActionSpace, make_action_space
 
-RECORD = Path("meta/recipe.json")  # in each dataset: its recipe, and which demos were dropped and why
-
 # LeRobot's encoder drops frames when its queue is full, as a live camera's must be; ours can wait.
 _QUEUE_SIZE = 1_000_000
-
-
-@dataclass(frozen=True)
-class Record:
-    """Where a dataset comes from."""
-
-    recipe: Recipe
-    dropped: dict[int, str]  # demo seed -> why it is not in the dataset
-
-    def write(self, path: Path) -> None:
-        """Write the record as JSON."""
-        path.write_text(json.dumps({"recipe": self.recipe.to_dict(), "dropped": self.dropped}, indent=2))
-
-    @classmethod
-    def read(cls, dataset: Path) -> "Record":
-        """Read the record of a dataset.
-
-        Raises:
-            DatasetError: ``er-il generate`` did not write the dataset.
-        """
-        path = dataset / RECORD
-        try:
-            values = json.loads(path.read_text())
-            dropped = {int(seed): str(reason) for seed, reason in values["dropped"].items()}
-            return cls(Recipe.from_dict(values["recipe"]), dropped)
-        except (FileNotFoundError, NotADirectoryError) as error:
-            raise DatasetError(f"{dataset} was not written by er-il generate: it has no {RECORD}.") from error
-        except (KeyError, TypeError, AttributeError, ValueError) as error:
-            raise DatasetError(f"{path} is not the record of a dataset.") from error
 
 
 @dataclass(frozen=True)
@@ -177,7 +147,7 @@ class _Writer:
         info = self._dataset.meta.info
         info.splits = self._recipe.splits
         write_info(info, self._dataset.root)
-        Record(self._recipe, dropped).write(self._dataset.root / RECORD)
+        Record(self._recipe, dropped).write(self._dataset.root)
 
 
 def _claim(work: Path, recipe: Recipe) -> Path:

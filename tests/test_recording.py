@@ -14,7 +14,8 @@ from rich.progress import Progress
 from er_il.demos import Demo, make_world, record_demo
 from er_il.errors import DatasetError, UnknownNameError
 from er_il.recipe import Recipe
-from er_il.recording import Record, generate
+from er_il.record import Record
+from er_il.recording import generate
 from er_il.schema import ACTION, DEMO_SEED, LEADER_JOINTS, action_spec
 from er_il.spaces import from_spec
 
@@ -158,7 +159,7 @@ def test_wrong_requests(tmp_path):
     with pytest.raises(DatasetError, match=r"Cannot write to .*file/out: Not a directory"):
         generate(RECIPE, ["joint"], tmp_path / "file" / "out", ask, workers=1)
     (tmp_path / "strange" / "joint").mkdir(parents=True)
-    with pytest.raises(DatasetError, match="not written by er-il generate"):
+    with pytest.raises(DatasetError, match=r"not a dataset of er-il generate: it has no meta.recipe\.json"):
         generate(RECIPE, ["joint"], tmp_path / "strange", ask, workers=1)
 
 

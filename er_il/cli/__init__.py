@@ -14,6 +14,7 @@ from er_il.errors import ErIlError
 COMMANDS: dict[str, str] = {
     "eval": "eval",
     "generate": "generate",
+    "replay": "replay",
     "train": "train",
 }
 

@@ -50,7 +50,9 @@ def generate(
     with make_progress(console) as progress:
         generated = generate_datasets(recipe, _split(spaces) or (), folder, progress, cores())
     for space, path in generated.paths.items():
-        console.print(f"{path}: {'written' if space in generated.new else 'was there already'}", highlight=False)
+        console.print(
+            f"{path}: {'written' if space in generated.new else 'was there already'}", highlight=False, soft_wrap=True
+        )
     dropped = tally(Counter(generated.dropped.values()))
     console.print(
         f"{recipe.episodes} demonstrations, {len(generated.dropped)} dropped{f' ({dropped})' * bool(dropped)}."

@@ -1,0 +1,54 @@
+"""``er-il replay``: execute recorded demonstrations again, through each encoding."""
+
+from pathlib import Path
+
+from tyro.conf import Positional
+
+
+def replay(datasets: Positional[tuple[str, ...]], *, out: Path = Path("outputs/replay")) -> None:
+    """Execute recorded demonstrations again through each decoder: the ceiling of each encoding.
+
+    Args:
+        datasets: Datasets, folders of datasets, or tasks, such as reach_cup.
+        out: Folder of report.json.
+    """
+    from rich.console import Console
+    from rich.table import Table
+
+    from er_il.cli.progress import make_progress
+    from er_il.errors import DatasetError
+    from er_il.provenance import provenance
+    from er_il.replay import find_datasets, write_report
+    from er_il.replay import replay as replay_datasets
+    from er_il.workers import cores
+
+    if not datasets:
+        raise DatasetError("Name a dataset or a task, such as reach_cup.")
+    found = find_datasets(datasets)
+    console = Console()
+    with make_progress(console) as progress:
+        bars = {}
+
+        def advance(dataset: Path, decoder: str, done: int, total: int) -> None:
+            if (dataset, decoder) not in bars:
+                bars[dataset, decoder] = progress.add_task(f"Replay {dataset.parent.name} {decoder}", total=total)
+            progress.update(bars[dataset, decoder], completed=done)
+
+        cells = replay_datasets(found, cores(), advance)
+    table = Table("task", "decoder", "success (exact 95 %)", "failures", "invalid", "off by [rad]")
+    for cell in cells:
+        report = cell.report()
+        low, high = report["interval"]
+        failures = ", ".join(f"{name} {count}" for name, count in report["failures"].items())
+        table.add_row(
+            cell.task,
+            cell.decoder,
+            f"{cell.successes}/{len(cell.demos)} ({100 * low:.0f} to {high:.0%})",
+            failures,
+            f"{report['invalid_rate']:.1%}",
+            f"{report['max_joint_deviation']:.4f}",
+        )
+    console.print(table)
+    path = out / "report.json"
+    write_report(cells, provenance() | {"datasets": [str(dataset) for dataset in found]}, path)
+    console.print(str(path), highlight=False, soft_wrap=True)
