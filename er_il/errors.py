@@ -29,6 +29,10 @@ class ShapeError(ErIlError, ValueError):
         super().__init__(f"{what} has shape {got}, expected {expected}.")
 
 
+class BoundsError(ErIlError, ValueError):
+    """A change larger than the bounds that a delta space declares."""
+
+
 class SpecError(ErIlError):
     """An action specification that is unreadable or does not match."""
 

@@ -1,4 +1,4 @@
-"""The action spaces: joint, task and the paper's redundancy-aware ER family."""
+"""The action spaces: joint, task and the paper's redundancy-aware ER family, absolute or as deltas."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -9,12 +9,22 @@ from er_il.errors import ArmError, SpecError, UnknownNameError
 from er_il.kinematics import kinematics_of
 from er_il.rotation import Quaternion, RotationCode, make_rotation
 from er_il.spaces.base import SPEC_VERSION, ActionSpace, Decoded
+from er_il.spaces.delta import PREFIX, DeltaBounds, DeltaSpace, make_delta_space
 from er_il.spaces.era import EraSpace
 from er_il.spaces.erj import ErjSpace
 from er_il.spaces.joint import JointSpace
 from er_il.spaces.task import TaskSpace
 
-__all__ = ["SPACES", "ActionSpace", "Decoded", "from_spec", "make_action_space"]
+__all__ = [
+    "SPACES",
+    "ActionSpace",
+    "Decoded",
+    "DeltaBounds",
+    "DeltaSpace",
+    "JointSpace",
+    "from_spec",
+    "make_action_space",
+]
 
 
 def _joint(arm: Arm, rotation: RotationCode, posture: Vector | None) -> ActionSpace:
@@ -53,23 +63,38 @@ SPACES: dict[str, Callable[[Arm, RotationCode, Vector | None], ActionSpace]] = {
 }
 
 
-def make_action_space(kind: str, arm: Arm, *, rotation: str = "quat", posture: Vector | None = None) -> ActionSpace:
-    """Build an absolute action space by name.
+def make_action_space(
+    kind: str,
+    arm: Arm,
+    *,
+    rotation: str = "quat",
+    posture: Vector | None = None,
+    bounds: DeltaBounds | None = None,
+) -> ActionSpace:
+    """Build an action space by name.
 
     Args:
-        kind: ``joint``, ``task``, ``erj`` or ``era``.
+        kind: ``joint``, ``task``, ``erj`` or ``era``; with ``delta_`` in front, changes of its commands.
         arm: The arm it commands.
         rotation: ``quat`` or ``rot6d``; the quaternion's hemisphere is that of the arm's home pose.
+            Deltas always use a rotation vector.
         posture: (n,) [rad] null-space posture for ``task``; without it IK stays near the seed.
+        bounds: Largest changes of a delta space.
 
     Raises:
         UnknownNameError: unknown kind or rotation.
         ArmError: an ER space for an arm without redundancy, or ERA without the arm's angle frames.
     """
-    if kind not in SPACES:
-        raise UnknownNameError("action space", kind, SPACES)
     code = make_rotation(rotation, kinematics_of(arm).fk(arm.home)[:3, :3])
-    return SPACES[kind](arm, code, posture)
+    space = _absolute(kind)(arm, code, posture)
+    return make_delta_space(space, bounds) if kind.startswith(PREFIX) else space
+
+
+def _absolute(kind: str) -> Callable[[Arm, RotationCode, Vector | None], ActionSpace]:
+    absolute = kind.removeprefix(PREFIX)
+    if absolute not in SPACES:
+        raise UnknownNameError("action space", kind, [*SPACES, *(PREFIX + name for name in SPACES)])
+    return SPACES[absolute]
 
 
 def from_spec(spec: Mapping[str, Any], arm: Arm | None = None, *, posture: Vector | None = None) -> ActionSpace:
@@ -93,11 +118,11 @@ def from_spec(spec: Mapping[str, Any], arm: Arm | None = None, *, posture: Vecto
         )
         if "hemisphere" in spec:
             rotation = Quaternion(tuple(spec["hemisphere"]))
-        if kind not in SPACES:
-            raise UnknownNameError("action space", kind, SPACES)
-        space = SPACES[kind](arm, rotation, posture)
+        space = _absolute(kind)(arm, rotation, posture)
         if isinstance(space, EraSpace):
             space = replace(space, reference=float(spec["arm_angle"]["reference"]))
+        if kind.startswith(PREFIX):
+            space = make_delta_space(space, DeltaBounds(**spec["bounds"]))
         expected = {key: described[key] for key in ("joints", "base_frame", "ee_frame", "redundant", "fingerprint")}
     except KeyError as error:
         raise SpecError(f"Action spec has no {error}.") from error

@@ -33,7 +33,7 @@ class Decoded:
 
 @dataclass(frozen=True, eq=False)
 class ActionSpace(ABC):
-    """An absolute action space of one arm and its gripper.
+    """An action space of one arm and its gripper.
 
     The last dimension of an action is the gripper's opening in [0, 1].
     """
@@ -52,7 +52,7 @@ class ActionSpace(ABC):
         """Encode a trajectory q (N, n) [rad] as (N, dim - 1)."""
 
     @abstractmethod
-    def _decode_arm(self, action: Vector, seed: Vector) -> Decoded:
+    def _decode_arm(self, action: Vector, seed: Vector, current: Vector) -> Decoded:
         """Decode a finite action (dim - 1,); the gripper is filled in by the caller."""
 
     @abstractmethod
@@ -96,24 +96,28 @@ class ActionSpace(ABC):
         action = np.column_stack([self._encode_arm(batch), opening])
         return action[0] if angles.ndim == 1 else action
 
-    def decode(self, action: ArrayLike, seed: ArrayLike) -> Decoded:
+    def decode(self, action: ArrayLike, seed: ArrayLike, current: ArrayLike | None = None) -> Decoded:
         """Decode an action to joint angles near a seed.
 
         Args:
             action: (dim,) as a policy gives it; rotations are normalised, the gripper is clipped.
-            seed: (n,) [rad] the arm's current angles, where IK starts.
+            seed: (n,) [rad] the arm's measured angles, where IK starts.
+            current: (n,) [rad] the last command, which a delta counts from; the seed if omitted.
+                Absolute spaces do not need it.
         """
         command = np.asarray(action, dtype=np.float64)
         start = np.asarray(seed, dtype=np.float64)
         if command.shape != (self.dim,):
             raise ShapeError(f"A {self.kind} action", command.shape, f"({self.dim},): {', '.join(self.names)}")
-        if start.shape != (self.arm.dof,):
-            raise ShapeError("The seed", start.shape, f"({self.arm.dof},)")
+        last = start if current is None else np.asarray(current, dtype=np.float64)
+        for what, angles in (("The seed", start), ("The current command", last)):
+            if angles.shape != (self.arm.dof,):
+                raise ShapeError(what, angles.shape, f"({self.arm.dof},)")
         start = np.clip(start, self.arm.lower, self.arm.upper)
         opening = float(np.clip(command[-1], 0.0, 1.0)) if np.isfinite(command[-1]) else 1.0
         if not np.all(np.isfinite(command)):
             return Decoded(start, opening, Status.INVALID)
-        decoded = self._decode_arm(command[:-1], start)
+        decoded = self._decode_arm(command[:-1], start, np.clip(last, self.arm.lower, self.arm.upper))
         return Decoded(decoded.q, opening, decoded.status, decoded.pos_err, decoded.rot_err, decoded.iters)
 
     def spec(self) -> dict[str, Any]:

@@ -23,7 +23,7 @@ class JointSpace(ActionSpace):
     def _encode_arm(self, q: Array) -> Array:
         return q
 
-    def _decode_arm(self, action: Vector, seed: Vector) -> Decoded:
+    def _decode_arm(self, action: Vector, seed: Vector, current: Vector) -> Decoded:
         q = np.clip(action, self.arm.lower, self.arm.upper)
         inside = np.all(np.abs(q - action) <= LIMIT_MARGIN)
         return Decoded(q, 0.0, Status.OK if inside else Status.LIMIT)

@@ -41,7 +41,7 @@ class PoseSpace(ActionSpace):
         T_base_ee = self.kinematics.fk_batch(q)
         return np.column_stack([T_base_ee[:, :3, 3], self.rotation.encode(T_base_ee[:, :3, :3]), self.redundancy(q)])
 
-    def _decode_arm(self, action: Vector, seed: Vector) -> Decoded:
+    def _decode_arm(self, action: Vector, seed: Vector, current: Vector) -> Decoded:
         split = len(POSITION_NAMES) + len(self.rotation.names)
         T_base_ee = np.eye(4)
         T_base_ee[:3, 3] = action[:3]
@@ -49,7 +49,11 @@ class PoseSpace(ActionSpace):
             T_base_ee[:3, :3] = self.rotation.decode(action[3:split])
         except RotationError:
             return Decoded(seed, 0.0, Status.INVALID)
-        ik = self.solve(T_base_ee, action[split:], seed)
+        return self.decode_pose(T_base_ee, action[split:], seed)
+
+    def decode_pose(self, T_base_ee: Array, redundancy: Vector, seed: Vector) -> Decoded:
+        """Decode a pose (4, 4) and redundancy values; the gripper is left at 0."""
+        ik = self.solve(T_base_ee, redundancy, seed)
         return Decoded(ik.q, 0.0, ik.status, ik.pos_err, ik.rot_err, ik.iters)
 
     def _details(self) -> dict[str, Any]:
