@@ -1,0 +1,122 @@
+import csv
+import json
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from lerobot.configs import FeatureType, PolicyFeature
+from lerobot.policies import make_pre_post_processors
+from lerobot.policies.act.configuration_act import ACTConfig
+from lerobot.policies.act.modeling_act import ACTPolicy
+
+from er_il import Arm, make_action_space
+from er_il.contract import Contract
+from er_il.errors import ErIlError, PolicyError, UnknownNameError
+from er_il.evaluation import Cell, Episode, evaluate, write_cells
+
+PANDA = Arm.preset("panda")
+
+
+@pytest.fixture(scope="module")
+def policies(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Untrained policies: small motions around a pose, different for every observation."""
+    folder = tmp_path_factory.mktemp("policies")
+    return {kind: _untrained(kind, folder / kind) for kind in ("joint", "task", "erj")}
+
+
+def _untrained(kind: str, folder: Path) -> Path:
+    torch.manual_seed(0)
+    space = make_action_space(kind, PANDA)
+    start = np.array([1.132, -0.988, -0.315, -1.867, -1.083, 1.922, -1.732])
+    config = ACTConfig(
+        device="cpu",
+        input_features={
+            "observation.state": PolicyFeature(FeatureType.STATE, (15,)),
+            "observation.environment_state": PolicyFeature(FeatureType.ENV, (7,)),
+        },
+        output_features={"action": PolicyFeature(FeatureType.ACTION, (space.dim,))},
+        chunk_size=5,
+        n_action_steps=1,
+        temporal_ensemble_coeff=0.01,
+        dim_model=32,
+        dim_feedforward=32,
+        n_heads=2,
+        n_encoder_layers=1,
+        use_vae=False,
+        pretrained_backbone_weights=None,
+        tags=[Contract.of_space(space).tag],
+    )
+    mean = torch.tensor(space.encode(start), dtype=torch.float32)
+    stats = {"action": {"mean": mean, "std": torch.full((space.dim,), 0.4)}}
+    ACTPolicy(config).save_pretrained(folder)
+    for processor in make_pre_post_processors(config, dataset_stats=stats):
+        processor.save_pretrained(folder)
+    return folder
+
+
+def outcomes(cell: Cell) -> list[tuple[object, ...]]:
+    return [(e.seed, e.success, e.failure, e.statuses, e.steps, e.joint_step) for e in cell.episodes]
+
+
+@pytest.mark.slow
+def test_neither_the_batch_nor_the_number_of_episodes_changes_an_outcome(policies: dict[str, Path]):
+    runs = [
+        evaluate(policies["erj"], "reach_cup", "erj", episodes=n, batch_size=batch)
+        for n, batch in [(4, 1), (4, 3), (3, 25)]
+    ]
+    assert [seed for seed, *_ in outcomes(runs[0])] == [1000, 1001, 1002, 1003]
+    assert outcomes(runs[0]) == outcomes(runs[1])
+    assert outcomes(runs[2]) == outcomes(runs[0])[:3]
+    assert len({e.joint_step for e in runs[0].episodes}) == 4  # or equality would say nothing
+
+
+def test_both_decoders_of_task_space_take_the_task_policy(policies: dict[str, Path]):
+    for name in ("task-nearest", "task-posture"):
+        report = evaluate(policies["task"], "reach_cup", name, episodes=1).report()
+        assert (report["task"], report["decoder"], report["episodes"]) == ("reach_cup", name, 1)
+        assert sum(report["statuses"].values()) == report["mean_steps"]
+
+
+def test_a_policy_of_another_space_is_refused(policies: dict[str, Path]):
+    with pytest.raises(PolicyError, match="space 'joint' not 'task'"):
+        evaluate(policies["joint"], "reach_cup", "task-nearest", episodes=1)
+
+
+def test_mistakes(policies: dict[str, Path], tmp_path: Path):
+    with pytest.raises(UnknownNameError, match="reach_cup"):
+        evaluate(policies["erj"], "reach_cap", "erj")
+    with pytest.raises(UnknownNameError, match="task-nearest"):
+        evaluate(policies["erj"], "reach_cup", "task")
+    with pytest.raises(ErIlError, match="at least one"):
+        evaluate(policies["erj"], "reach_cup", "erj", episodes=0)
+    with pytest.raises(PolicyError, match="No policy at"):
+        evaluate(tmp_path, "reach_cup", "erj")
+
+
+def episode(seed: int, failure: str = "", joint_step: float = 0.1) -> Episode:
+    return Episode(seed, not failure, failure, Counter(ok=3, jump=1), (1e-3, 1e-3, 1e-3, 9e-3), joint_step)
+
+
+def test_the_report_counts(tmp_path: Path):
+    cell = Cell("reach_cup", "erj", (episode(7), episode(8, "collision", 0.4), episode(9, "timeout"), episode(10)))
+    write_cells([cell], {"first_seed": 7}, tmp_path / "new")
+    written = json.loads((tmp_path / "new" / "report.json").read_text())
+    assert written["meta"] == {"first_seed": 7}
+    report = written["cells"][0]
+    assert (report["successes"], report["episodes"]) == (2, 4)
+    assert report["interval"] == pytest.approx([0.0676, 0.9324], abs=1e-4)
+    assert report["failures"] == {"collision": 1, "timeout": 1}
+    assert report["invalid_rate"] == pytest.approx(0.25)
+    assert report["decode_p50_ms"] == pytest.approx(1.0)
+    assert report["max_joint_step"] == pytest.approx(0.4)
+    with (tmp_path / "new" / "episodes.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["seed"], row["success"], row["failure"]) for row in rows] == [
+        ("7", "1", ""),
+        ("8", "0", "collision"),
+        ("9", "0", "timeout"),
+        ("10", "1", ""),
+    ]
+    assert not list((tmp_path / "new").glob("*.partial"))
