@@ -11,6 +11,7 @@ the fold. Near it the seed may lie closer to the one of the pair that the steps 
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import placo  # pyright: ignore[reportMissingImports]
@@ -28,13 +29,15 @@ POSTURE_ITERATIONS = 30
 DAMPING_GROWTH = 1e-2  # [1] damping per squared miss in m and rad
 CAUTION = 10.0  # damping grows by this factor after a step that overshot, and shrinks after one that did not
 POLISH = 1e-8  # [m and rad] solve this far: the last steps are quadratic, and near a fold joints need it
+SLOW = 0.95  # a step that leaves more of the miss than this is slow,
+PATIENCE = 6  # and so many in a row, the goal still missed, mean that it is out of reach
 STALL = 1e-10  # [rad] a step this small changes nothing: stop early
 FOLD = 3e-2  # smallest singular value (m and rad mixed) below which another solution may lie close by
 FOLD_REACH = 0.5  # [rad] how far away that other solution is looked for
 FOLD_MARGIN = 0.05  # [rad] by how much its first guess may look farther from the seed
-NEAR = 0.5  # [m and rad] a goal this close to the seed deserves further attempts
+NEAR = 0.3  # [m and rad] a goal this close to the seed deserves further attempts
 ASIDE = (0.1, -0.1, 0.2, -0.2)  # [rad] how far beside the seed they start
-FEW_ITERATIONS = 20
+FEW_ITERATIONS = 12
 FOLD_STEP = 1e-4  # [rad] of the finite difference across the fold
 
 
@@ -47,8 +50,7 @@ class Goal:
     fixed: frozenset[str]  # joints that stay where the start has them
 
 
-@dataclass(frozen=True)
-class Miss:
+class Miss(NamedTuple):
     """How far joint angles are from a goal."""
 
     position: float  # [m]
@@ -65,7 +67,7 @@ class Attempt:
     q: Vector  # (n,) [rad]
     miss: Miss
     iters: int
-    moving: bool  # whether the last step still changed something
+    moving: bool  # whether it was still getting closer
 
     @property
     def reached(self) -> bool:
@@ -96,7 +98,7 @@ class LocalSearch:
         """Run QP steps from q until the goal is met well within tolerance, or nothing moves any more."""
         program = self._program(goal, posture is not None)
         program.aim(goal.T_base_ee, posture)
-        moving, iters, caution = True, 0, 1.0
+        moving, iters, caution, slow = True, 0, 1.0, 0
         miss = self._miss(goal, q)
         while moving and iters < limit and (posture is not None or miss.size > POLISH):
             try:
@@ -104,9 +106,10 @@ class LocalSearch:
             except RuntimeError:  # the QP has no solution: keep the last angles, the caller sees the miss
                 moving = False
                 break
-            moving = bool(np.abs(moved - q).max() >= STALL)
             iters += 1
             missed = self._miss(goal, moved)
+            slow = slow + 1 if missed.size > max(SLOW * miss.size, POSITION_TOLERANCE) else 0
+            moving = bool(np.abs(moved - q).max() >= STALL) and (posture is not None or slow < PATIENCE)
             if posture is None and missed.size > miss.size:
                 caution *= CAUTION  # overshot: try a shorter step from the same place
             else:
