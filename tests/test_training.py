@@ -1,0 +1,129 @@
+import json
+import sys
+from pathlib import Path
+
+import pytest
+from lerobot.scripts import lerobot_eval, lerobot_train
+from rich.progress import Progress
+
+from er_il import cli
+from er_il.errors import DatasetError, PolicyError, UnknownNameError
+from er_il.evaluation import evaluate
+from er_il.recipe import Recipe
+from er_il.recording import generate
+from er_il.training import Training, default_config, pretrained
+
+RECIPE = Recipe.load("reach_cup").resized(3)
+
+
+@pytest.fixture(scope="module")
+def datasets(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("data") / "reach_cup"
+    generate(RECIPE, ["joint", "erj"], out, Progress(disable=True), workers=2)
+    return out
+
+
+def training(datasets: Path, out: Path, **changes: object) -> Training:
+    settings = {"space": "erj", "dataset": datasets / "erj", "config": default_config("erj"), "steps": 2} | changes
+    return Training(task="reach_cup", out=out, seed=0, **settings)  # pyright: ignore[reportArgumentType]
+
+
+def run(monkeypatch: pytest.MonkeyPatch, main: object, *arguments: str) -> None:
+    """Run a stock command in this process."""
+    monkeypatch.setattr(sys, "argv", ["command", *arguments])
+    main()  # pyright: ignore[reportCallIssue]
+
+
+def test_the_command_trains_on_the_training_episodes_and_declares_the_actions(datasets: Path, tmp_path: Path):
+    command = training(datasets, tmp_path / "out").command
+    assert command[0] == "lerobot-train"
+    assert "--dataset.episodes=[0,1]" in command
+    assert '--policy.tags=["er_il:erj/panda/panda_hand_tcp/quat/panda_joint1"]' in command
+
+
+@pytest.mark.slow
+def test_from_demonstrations_to_a_rollout_with_the_stock_commands(
+    datasets: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    out = tmp_path / "policy"
+    first = training(datasets, out)
+    assert first.done_steps == 0
+    run(monkeypatch, lerobot_train.main, *first.command[1:])
+    assert first.finished
+    longer = training(datasets, out, steps=4)
+    assert (longer.done_steps, longer.finished) == (2, False)
+    assert "--resume=true" in longer.command
+    run(monkeypatch, lerobot_train.main, *longer.command[1:])
+    assert (longer.done_steps, longer.finished) == (4, True)
+    config = json.loads((longer.policy / "train_config.json").read_text())
+    assert config["dataset"]["episodes"] == [0, 1]
+
+    # Recording instead of filming: people's pictures take longer than the rollout itself.
+    rollout = ["--env.type=er_il", "--env.task=reach_cup", f"--policy.path={longer.policy}", "--eval.recording=true"]
+    rollout += ["--eval.n_episodes=2", "--eval.batch_size=2", "--eval.use_async_envs=false"]
+    results = tmp_path / "eval"
+    run(monkeypatch, lerobot_eval.main, *rollout, "--env.action_space=erj", f"--output_dir={results}")
+    overall = json.loads((results / "eval_info.json").read_text())["overall"]
+    assert overall["n_episodes"] == 2
+    ours = evaluate(longer.policy, "reach_cup", "erj", episodes=2)
+    assert overall["pc_success"] == 50 * ours.successes
+
+    with pytest.raises(PolicyError, match="space 'erj' not 'joint'"):
+        run(monkeypatch, lerobot_eval.main, *rollout, "--env.action_space=joint", f"--output_dir={tmp_path / 'no'}")
+
+
+def test_an_interruption_before_the_first_checkpoint_is_cleared_away(datasets: Path, tmp_path: Path):
+    begun = training(datasets, tmp_path / "out")
+    (begun.out / "checkpoints" / "000500").mkdir(parents=True)
+    begun.clear()
+    assert not begun.out.exists()
+    (begun.out / "thesis").mkdir(parents=True)
+    with pytest.raises(PolicyError, match="thesis"):
+        begun.clear()
+    assert (begun.out / "thesis").exists()
+
+
+def test_a_checkpoint_cut_off_while_it_was_written_is_not_resumed(datasets: Path, tmp_path: Path):
+    begun = training(datasets, tmp_path / "out", steps=9)
+    for step in (2, 4):
+        state = begun.out / "checkpoints" / f"00000{step}" / "training_state"
+        state.mkdir(parents=True)
+        (state / "training_step.json").write_text(json.dumps({"step": step}))
+    assert begun.done_steps == 2  # the link is missing: the newest may be incomplete
+    (begun.out / "checkpoints" / "last").symlink_to("000004")
+    assert begun.done_steps == 4
+
+
+def test_mistakes(datasets: Path, tmp_path: Path):
+    with pytest.raises(UnknownNameError, match="joint, task, erj"):
+        training(datasets, tmp_path, space="jiont")
+    with pytest.raises(DatasetError, match="No dataset at"):
+        training(datasets, tmp_path, dataset=tmp_path / "none")
+    with pytest.raises(DatasetError, match="holds joint actions, not erj"):
+        training(datasets, tmp_path, dataset=datasets / "joint")
+    with pytest.raises(PolicyError, match="no training configuration"):
+        training(datasets, tmp_path, config=tmp_path / "none.yaml")
+    with pytest.raises(PolicyError, match="at least one"):
+        training(datasets, tmp_path, steps=0)
+    with pytest.raises(PolicyError, match="No policy at"):
+        pretrained(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["train", "reach_cap", "erj"], "Unknown task 'reach_cap'. Valid: lift_cup, reach_cup."),
+        (["train", "reach_cup", "ejr"], "Unknown action space 'ejr'."),
+        (["train", "reach_cup", "erj", "--dataset", "nowhere"], "No dataset at nowhere"),
+        (["eval", "nowhere", "--task", "reach_cup", "--decoder", "erj"], "No policy at nowhere"),
+    ],
+)
+def test_the_command_line_answers_mistakes_in_one_line(
+    arguments: list[str], complaint: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    with pytest.raises(SystemExit) as left:
+        run(monkeypatch, cli.main, *arguments)
+    assert left.value.code == 2
+    message = capsys.readouterr().err
+    assert complaint in message
+    assert message.count("\n") == 1
