@@ -1,5 +1,6 @@
 """Generating datasets: demos are recorded once and written as one LeRobot v3 dataset a space."""
 
+import errno
 import json
 import os
 import shutil
@@ -172,4 +173,10 @@ def _writing_to(out: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise DatasetError(f"Cannot write to {out}: {error.strerror or error}.") from error
+        reason = os.strerror(error.errno) if error.errno else error
+        raise DatasetError(f"Cannot write to {out}: {reason}.") from error
+    except RuntimeError as error:
+        full = os.strerror(errno.ENOSPC)
+        if full not in str(error):  # all that LeRobot's encoder threads pass on is the text
+            raise
+        raise DatasetError(f"Cannot write to {out}: {full}.") from error
