@@ -1,6 +1,6 @@
 """Kinematics of an arm: Pinocchio's forward kinematics, and inverse kinematics by Placo's QP."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import lru_cache
@@ -14,6 +14,7 @@ from er_il.errors import UnknownNameError
 from er_il.forward import ForwardKinematics
 from er_il.search import Attempt, Goal, LocalSearch
 
+FAR = 0.3  # [rad] a solution this far from the seed is looked at with suspicion
 LIMIT_MARGIN = 1e-4  # [rad] a joint this close to its limit is at it
 
 
@@ -95,8 +96,8 @@ class Kinematics(ForwardKinematics):
         found = self._search.run(goal, start)
         if posture is None:
             found = self._search.across_fold(goal, found, start) or found
-            if not found.reached:
-                found = self._search.beside(goal, start) or found
+            if not found.reached or np.abs(found.q - start).max() > FAR:
+                found = self._search.beside(goal, start, found) or found
         if clipped:
             status = Status.LIMIT
         elif found.reached:
@@ -104,6 +105,16 @@ class Kinematics(ForwardKinematics):
         else:
             status = self._why_not(found, goal)
         return IkResult(found.q, status, found.miss.position, found.miss.rotation, pulled + found.iters)
+
+    def conditioning(self, q: ArrayLike, fixed: Collection[str] = (), *, arm_angle: bool = False) -> float:
+        """How far a configuration is from a singularity of what is commanded.
+
+        The smallest singular value, in metres and radians mixed, of the end effector's Jacobian by
+        the joints that are not ``fixed`` (ERJ), with the elbow's way along its circle as a seventh
+        row if the arm angle is commanded (ERA). At 0 two solutions meet.
+        """
+        goal = Goal(np.eye(4), 0.0 if arm_angle else None, frozenset(fixed))
+        return float(np.linalg.svd(self._search.derivative(goal, self._checked(q)), compute_uv=False)[-1])
 
     def _why_not(self, attempt: Attempt, goal: Goal) -> Status:
         q, arm = attempt.q, self.arm

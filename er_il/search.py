@@ -124,16 +124,17 @@ class LocalSearch:
         turn = wrapped(goal.arm_angle - angle)
         return Miss(pos_err, rot_err, math.hypot(pos_err, rot_err, radius * turn), abs(turn), (slope, radius * turn))
 
-    def beside(self, goal: Goal, seed: Vector) -> Attempt | None:
-        """Try from beside the seed, along the direction in which the goal is least sensitive there.
+    def beside(self, goal: Goal, seed: Vector, found: Attempt) -> Attempt | None:
+        """A better solution than ``found``, from beside the seed, if there is one.
 
-        Where a goal close to the seed was missed, a fold or the elbow's axis lay in between.
+        Starts lie along the direction in which the goal is least sensitive: where a goal close to
+        the seed was missed, or met only far away, a fold or the elbow's axis lay in between.
         """
         if not self._determined(goal) or self._miss(goal, seed).size > NEAR:
             return None
-        v = self._embedded(goal, np.linalg.svd(self._derivative(goal, seed))[2][-1])
+        v = self._embedded(goal, np.linalg.svd(self.derivative(goal, seed))[2][-1])
         starts = (np.clip(seed + share * v, self.arm.lower, self.arm.upper) for share in ASIDE)
-        attempts = [self.run(goal, start, limit=FEW_ITERATIONS) for start in starts]
+        attempts = [found, *(self.run(goal, start, limit=FEW_ITERATIONS) for start in starts)]
         reached = [attempt for attempt in attempts if attempt.reached]
         return min(reached, key=lambda attempt: float(np.linalg.norm(attempt.q - seed)), default=None)
 
@@ -145,12 +146,12 @@ class LocalSearch:
         """
         if not self._determined(goal):
             return None
-        left, slopes, right = np.linalg.svd(self._derivative(goal, found.q))
+        left, slopes, right = np.linalg.svd(self.derivative(goal, found.q))
         slope = float(slopes[-1])
         if slope > FOLD:
             return None
         v = self._embedded(goal, right[-1])
-        ahead = float(left[:, -1] @ self._derivative(goal, found.q + FOLD_STEP * v) @ right[-1])
+        ahead = float(left[:, -1] @ self.derivative(goal, found.q + FOLD_STEP * v) @ right[-1])
         change = (ahead - slope) / FOLD_STEP
         if abs(change) * FOLD_REACH <= 2.0 * slope:
             return None
@@ -170,7 +171,7 @@ class LocalSearch:
         """Whether the goal has isolated solutions: as many conditions as free joints."""
         return int(self.free(goal).sum()) == POSE_DOF + (goal.arm_angle is not None)
 
-    def _derivative(self, goal: Goal, q: Vector) -> NDArray[np.float64]:
+    def derivative(self, goal: Goal, q: Vector) -> NDArray[np.float64]:
         """Derivative of what the goal conditions by the free joints, square where it is determined."""
         jacobian = self._kinematics.jacobian(q)
         if goal.arm_angle is not None:

@@ -4,6 +4,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from er_il.arm import Vector
 from er_il.kinematics import IkResult
@@ -31,6 +32,9 @@ class EraSpace(PoseSpace):
         angles = self.kinematics.arm_angle.along(q)
         unwrapped = np.unwrap(np.concatenate([[self.reference], angles]))[1:]
         return np.asarray(unwrapped, dtype=np.float64)[:, None]
+
+    def conditioning(self, q: ArrayLike) -> float:
+        return self.kinematics.conditioning(q, arm_angle=True)
 
     def solve(self, T_base_ee: Array, redundancy: Vector, seed: Vector) -> IkResult:
         return self.kinematics.solve(T_base_ee, seed, arm_angle=float(redundancy[0]))

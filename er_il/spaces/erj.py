@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from numpy.typing import ArrayLike
+
 from er_il.arm import Vector
 from er_il.kinematics import IkResult
 from er_il.spaces.base import Array
@@ -20,6 +22,9 @@ class ErjSpace(PoseSpace):
 
     def redundancy(self, q: Array) -> Array:
         return q[:, [self.arm.joints.index(joint) for joint in self.arm.redundant]]
+
+    def conditioning(self, q: ArrayLike) -> float:
+        return self.kinematics.conditioning(q, fixed=self.arm.redundant)
 
     def solve(self, T_base_ee: Array, redundancy: Vector, seed: Vector) -> IkResult:
         fixed = dict(zip(self.arm.redundant, redundancy.tolist(), strict=True))

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from er_il.arm import Vector
 from er_il.kinematics import IkResult, Status
@@ -32,6 +33,10 @@ class PoseSpace(ActionSpace):
     @abstractmethod
     def solve(self, T_base_ee: Array, redundancy: Vector, seed: Vector) -> IkResult:
         """Find joint angles with that pose (4, 4) and those redundancy values, near the seed (n,)."""
+
+    def conditioning(self, q: ArrayLike) -> float:
+        """Distance of q (n,) [rad] from a singularity: see :meth:`er_il.kinematics.Kinematics.conditioning`."""
+        return self.kinematics.conditioning(q)
 
     @property
     def arm_names(self) -> tuple[str, ...]:

@@ -1,0 +1,59 @@
+"""The leading property, sampled: decode(encode(q), seed near q) gives q back, or shows why not."""
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from er_il.arm import Vector
+from er_il.kinematics import LIMIT_MARGIN, Status
+from er_il.spaces import ActionSpace, Decoded
+from er_il.spaces.pose import PoseSpace
+
+EXACT = 1e-3  # [rad] a decode that misses a joint by more has not returned the configuration
+SINGULAR = 2e-2  # a smallest singular value (m and rad mixed) below this explains a miss
+
+
+@dataclass(frozen=True)
+class RoundTrip:
+    """One configuration encoded, and decoded from a seed nearby."""
+
+    q: Vector  # (n,) [rad]
+    seed: Vector  # (n,) [rad]
+    decoded: Decoded
+    conditioning: float  # at q, see Kinematics.conditioning; infinite in joint space
+    at_limit: bool  # whether a decoded joint is
+    latency: float  # [s] of the decoding
+
+    @property
+    def exact(self) -> bool:
+        """Whether the configuration came back."""
+        return float(np.abs(self.decoded.q - self.q).max()) <= EXACT
+
+    @property
+    def explained(self) -> bool:
+        """Whether a configuration that did not come back says so, or lies at a limit or singularity."""
+        return self.decoded.status is not Status.OK or self.at_limit or self.conditioning < SINGULAR
+
+    @property
+    def ambiguous(self) -> bool:
+        """Whether another solution is as good and nearer the seed: action and seed cannot tell which was meant."""
+        nearer = np.linalg.norm(self.decoded.q - self.seed) <= np.linalg.norm(self.q - self.seed)
+        return self.decoded.status is Status.OK and not self.exact and bool(nearer)
+
+
+def round_trips(space: ActionSpace, count: int, *, seed_error: float = 0.1, rng_seed: int = 0) -> list[RoundTrip]:
+    """Sample configurations uniformly within the limits, and seeds within ``seed_error`` [rad] of each joint."""
+    arm, rng = space.arm, np.random.default_rng(rng_seed)
+    trips = []
+    for _ in range(count):
+        q = rng.uniform(arm.lower, arm.upper)
+        seed = np.clip(q + rng.uniform(-seed_error, seed_error, arm.dof), arm.lower, arm.upper)
+        action = space.encode(q)
+        started = time.perf_counter()
+        decoded = space.decode(action, seed)
+        latency = time.perf_counter() - started
+        at_limit = np.any((decoded.q - arm.lower < LIMIT_MARGIN) | (arm.upper - decoded.q < LIMIT_MARGIN))
+        conditioning = space.conditioning(q) if isinstance(space, PoseSpace) else np.inf
+        trips.append(RoundTrip(q, seed, decoded, conditioning, bool(at_limit), latency))
+    return trips

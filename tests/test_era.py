@@ -1,0 +1,98 @@
+import numpy as np
+import pytest
+from chains import chain_arm
+
+from er_il import ActionSpace, Arm, Status, make_action_space
+from er_il.arm_angle import ElbowCircle
+from er_il.errors import ArmError
+from er_il.round_trip import EXACT
+
+PANDA = Arm.preset("panda")
+
+
+def test_the_arm_angle_is_zero_at_the_top_and_follows_the_equation():
+    kinematics = make_action_space("era", PANDA).kinematics
+    circle = kinematics.arm_angle.circle(PANDA.home)
+    assert np.isclose(circle.angle, 0.0, atol=1e-9)
+    angles = np.linspace(-np.pi, np.pi, 73)
+    heights = [circle.elbow(angle)[2] for angle in angles]
+    assert angles[np.argmax(heights)] == 0.0
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        q = rng.uniform(PANDA.lower, PANDA.upper)
+        elbow = kinematics.frame_pose(q, "panda_link4")[:3, 3]
+        circle = kinematics.arm_angle.circle(q)
+        np.testing.assert_allclose(circle.elbow(circle.angle), elbow, atol=1e-9)
+
+
+def test_the_slope_of_the_arm_angle_is_its_derivative():
+    arm_angle, rng, h = make_action_space("era", PANDA).kinematics.arm_angle, np.random.default_rng(1), 1e-6
+    for _ in range(10):
+        q = rng.uniform(PANDA.lower, PANDA.upper)
+        _, radius, slope = arm_angle.slope(q)
+        ahead, behind = arm_angle.along(q + h * np.eye(7)), arm_angle.along(q - h * np.eye(7))
+        np.testing.assert_allclose(slope, radius * (ahead - behind) / (2 * h), atol=1e-6)
+
+
+def test_the_commanded_arm_angle_is_reached_although_the_wrist_moves_with_it():
+    space = make_action_space("era", PANDA)
+    action = space.encode(PANDA.home)
+    wrists = []
+    for phi in np.radians([-40, -20, 20, 40]):
+        decoded = space.decode(np.concatenate([action[:7], [phi, 1.0]]), PANDA.home)
+        assert decoded.status is Status.OK
+        circle = space.kinematics.arm_angle.circle(decoded.q)
+        assert np.isclose(circle.angle, phi, atol=1e-3)
+        assert max(space.kinematics.pose_error(space.fk(PANDA.home), decoded.q)) < 1e-3
+        wrists.append(space.kinematics.frame_pose(decoded.q, "panda_link6")[:3, 3])
+    assert np.ptp(wrists, axis=0).max() > 0.01
+
+
+def test_an_arm_angle_out_of_reach_is_said():
+    space = make_action_space("era", PANDA)
+    action = space.encode(PANDA.home)
+    action[7] = np.pi  # elbow straight down: the Panda's limits forbid it here
+    decoded = space.decode(action, PANDA.home)
+    assert decoded.status is not Status.OK
+
+
+def test_the_arm_angle_is_continuous_past_half_a_turn_and_any_turn_decodes():
+    space = make_action_space("era", PANDA)
+    rng = np.random.default_rng(0)
+    phi = np.linspace(np.radians(150), np.radians(210), 61)
+    q = _with_arm_angle(space, phi, rng)
+    encoded = space.encode(q)[:, 7]
+    np.testing.assert_allclose(np.diff(encoded), np.diff(phi), atol=2e-3)
+    action = space.encode(q[20])
+    for turn in (-2, 1, 3):
+        other = action.copy()
+        other[7] += 2 * np.pi * turn
+        np.testing.assert_allclose(space.decode(other, q[20] + 0.01).q, q[20], atol=EXACT)
+
+
+def _with_arm_angle(space: ActionSpace, phi: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """A joint path through arm angles around half a turn, at whatever pose allows it."""
+    for _ in range(500):
+        q = rng.uniform(PANDA.lower, PANDA.upper)
+        path = []
+        for angle in phi:
+            ik = space.kinematics.solve(space.fk(q), path[-1] if path else q, arm_angle=float(angle))
+            if ik.status is not Status.OK or (path and np.abs(ik.q - path[-1]).max() > 0.2):
+                break
+            path.append(ik.q)
+        if len(path) == len(phi):
+            return np.array(path)
+    raise AssertionError("no pose of the Panda lets its elbow pass the lowest point")
+
+
+def test_a_vertical_axis_is_counted_from_the_base_frames_x():
+    circle = ElbowCircle.through(np.zeros(3), np.array([0.1, 0.1, 0.3]), np.array([0.0, 0.0, 0.6]))
+    assert np.isclose(circle.angle, np.radians(45))
+    np.testing.assert_allclose(circle.elbow(circle.angle), [0.1, 0.1, 0.3])
+
+
+def test_era_needs_frames_and_one_redundant_joint(tmp_path):
+    with pytest.raises(ArmError, match=r"^chain7 names no shoulder, elbow and wrist links, .* give angle_frames"):
+        make_action_space("era", chain_arm(tmp_path, 7))
+    with pytest.raises(ArmError, match=r"^chain8 has 2 redundant joints; one arm angle fixes only one. Use erj"):
+        make_action_space("era", chain_arm(tmp_path, 8))
