@@ -58,7 +58,7 @@ class ForwardKinematics:
         target = self._ee if frame is None else self._frame_id(frame)
         full = pin.computeFrameJacobian(self._model, self._data, self._model_q(self._checked(q)), target, AXES)
         R_base_world = pin.updateFramePlacement(self._model, self._data, self._base).rotation.T
-        return np.vstack([R_base_world @ full[:3], R_base_world @ full[3:]])[:, self._order]
+        return (R_base_world @ full[:, self._order].reshape(2, 3, -1)).reshape(6, -1)
 
     def pose_error(self, T_base_ee: Array, q: ArrayLike) -> tuple[float, float]:
         """Distance [m] and angle [rad] between a target pose and the pose at q."""

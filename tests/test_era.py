@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from chains import chain_arm
 
-from er_il import ActionSpace, Arm, Status, make_action_space
+from er_il import ActionSpace, Arm, Status, from_spec, make_action_space
 from er_il.arm_angle import ElbowCircle
-from er_il.errors import ArmError
+from er_il.errors import ArmError, SpecError
 from er_il.round_trip import EXACT
 
 PANDA = Arm.preset("panda")
@@ -96,3 +96,13 @@ def test_era_needs_frames_and_one_redundant_joint(tmp_path):
         make_action_space("era", chain_arm(tmp_path, 7))
     with pytest.raises(ArmError, match=r"^chain8 has 2 redundant joints; one arm angle fixes only one. Use erj"):
         make_action_space("era", chain_arm(tmp_path, 8))
+
+
+def test_the_spec_keeps_the_turn_and_the_frames_it_was_made_with():
+    space = make_action_space("era", PANDA)
+    spec = space.spec()
+    turned = from_spec({**spec, "arm_angle": {**spec["arm_angle"], "reference": 2 * np.pi}})
+    assert np.isclose(turned.encode(PANDA.home)[7], 2 * np.pi)
+    np.testing.assert_allclose(turned.decode(turned.encode(PANDA.home), PANDA.home + 0.05).q, PANDA.home, atol=EXACT)
+    with pytest.raises(SpecError, match=r"^The action spec measures the arm angle by .*panda_link3.*, but 'panda' by "):
+        from_spec({**spec, "arm_angle": {**spec["arm_angle"], "elbow": "panda_link3"}})
