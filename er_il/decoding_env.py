@@ -18,8 +18,9 @@ class DecodingEnv(
 ):
     """Wraps a joint-level environment so that its action is an action space's.
 
-    ``info`` gains, at every step, ``decode_status`` (a :class:`er_il.Status` value) and ``joint_step``
-    [rad], the largest joint change asked for. ``commander.tally`` sums the episode up.
+    ``info`` gains, at every step, ``command`` (n,) [rad] as sent to the arm, ``decode_status`` (a
+    :class:`er_il.Status` value) and ``joint_step`` [rad], the largest joint change asked for;
+    ``commander.tally`` sums the episode up.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], space: ActionSpace, on_invalid: str = BEST_EFFORT) -> None:
@@ -41,7 +42,11 @@ class DecodingEnv(
         command = self.commander.command(action, world.joint_positions)
         target = np.append(command.q, command.gripper).astype(np.float32)
         observation, reward, terminated, truncated, info = self.env.step(target)
-        info = info | {"decode_status": str(command.status), "joint_step": command.joint_step}
+        info = info | {
+            "command": command.q,
+            "decode_status": str(command.status),
+            "joint_step": command.joint_step,
+        }
         if command.stopped and not info["is_success"]:
             terminated = True
             info["failure"] = INVALID_ACTION

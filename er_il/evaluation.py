@@ -1,9 +1,7 @@
 """Rollouts of a trained policy through a decoder, batched, and what they amount to."""
 
-import csv
-import json
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,28 +9,16 @@ from typing import Any
 import numpy as np
 import torch
 from gymnasium.vector import SyncVectorEnv
-from lerobot.configs import PreTrainedConfig
-from lerobot.envs import preprocess_observation
 from lerobot.envs.utils import NEW_ROLLOUT_OPTION
-from lerobot.policies import PreTrainedPolicy, make_policy, make_pre_post_processors
-from lerobot.utils.constants import OBS_IMAGES
 
+from er_il.actor import POLICY_ROWS, Actor, environment_of
 from er_il.command import BEST_EFFORT
-from er_il.contract import NONE, check_policy, policy_contract
-from er_il.decoders import decoder
-from er_il.errors import ErIlError, PolicyError
+from er_il.errors import ErIlError
 from er_il.kinematics import Status
-from er_il.lerobot_env import ErIlEnvConfig
-from er_il.rotation import Quaternion
 from er_il.statistics import exact_interval
 
 FIRST_SEED = 1000  # LeRobot's own; demonstrations use seeds from a million up
 TIMEOUT = "timeout"
-
-# Matrix products of another shape round differently, and contact amplifies the last bit into another
-# outcome. So the policy always sees this many rows, the missing ones filled up: then an episode's
-# outcome depends on its seed alone, not on how many run beside it.
-POLICY_ROWS = 25
 
 
 @dataclass(frozen=True)
@@ -127,8 +113,8 @@ def evaluate(
         raise ErIlError(f"{episodes} episodes say nothing; ask for at least one.")
     if not 1 <= batch_size <= POLICY_ROWS:
         raise ErIlError(f"The batch size is {batch_size}; it must be between 1 and {POLICY_ROWS}.")
-    config = _environment(policy, task, decoder_name, on_invalid)
-    actor = _Actor.load(policy, config)
+    config = environment_of(policy, task, decoder_name, on_invalid)
+    actor = Actor.load(policy, config)
     threads = torch.get_num_threads()
     torch.set_num_threads(1)  # rounding depends on the number of threads, too
     vector = config.create_envs(min(batch_size, episodes))[config.type][0]
@@ -145,108 +131,7 @@ def evaluate(
     return Cell(task, decoder_name, tuple(done))
 
 
-def write_cells(cells: Sequence[Cell], meta: dict[str, Any], folder: Path) -> None:
-    """Write ``report.json`` and one row an episode in ``episodes.csv``."""
-    folder.mkdir(parents=True, exist_ok=True)
-    report = {"meta": meta, "cells": [cell.report() for cell in cells]}
-    _write(folder / "report.json", lambda path: path.write_text(json.dumps(report, indent=2) + "\n"))
-    _write(folder / "episodes.csv", lambda path: _write_csv(cells, path))
-
-
-def _write_csv(cells: Sequence[Cell], path: Path) -> None:
-    with path.open("w", newline="") as file:
-        rows = csv.writer(file)
-        rows.writerow(["task", "decoder", "seed", "success", "failure", "steps", "invalid", "max_joint_step"])
-        for cell in cells:
-            for e in cell.episodes:
-                rows.writerow(
-                    [
-                        cell.task,
-                        cell.decoder,
-                        e.seed,
-                        int(e.success),
-                        e.failure,
-                        e.steps,
-                        e.invalid,
-                        f"{e.joint_step:.6f}",
-                    ]
-                )
-
-
-def _write(path: Path, write: Callable[[Path], object]) -> None:
-    partial = path.with_name(path.name + ".partial")
-    write(partial)
-    partial.rename(path)
-
-
-def _environment(policy: Path, task: str, decoder_name: str, on_invalid: str) -> ErIlEnvConfig:
-    """Build the environment that a policy needs: its rotation code, its cameras."""
-    chosen = decoder(decoder_name)
-    contract = policy_contract(policy)
-    images = _load_config(policy).image_features
-    sizes = {feature.shape[-1] for feature in images.values()}
-    config = ErIlEnvConfig(
-        task=task,
-        action_space=chosen.space,
-        resolution=chosen.resolution,
-        rotation=Quaternion.kind if contract.rotation == NONE else contract.rotation,
-        on_invalid=on_invalid,
-        cameras=[key.removeprefix(f"{OBS_IMAGES}.") for key in images],
-        image_size=sizes.pop() if sizes else ErIlEnvConfig.image_size,
-    )
-    env = config.make()
-    check_policy(policy, env.space)
-    env.close()
-    return config
-
-
-def _load_config(policy: Path) -> PreTrainedConfig:
-    config = PreTrainedConfig.from_pretrained(policy)
-    config.pretrained_path = policy
-    if hasattr(config, "pretrained_backbone_weights"):
-        config.pretrained_backbone_weights = None  # pyright: ignore[reportAttributeAccessIssue]  the checkpoint has them
-    return config
-
-
-@dataclass(frozen=True)
-class _Actor:
-    """A policy with its processors."""
-
-    policy: PreTrainedPolicy
-    preprocess: Callable[[dict[str, Any]], dict[str, Any]]
-    postprocess: Callable[[torch.Tensor], torch.Tensor]
-
-    @classmethod
-    def load(cls, path: Path, config: ErIlEnvConfig) -> "_Actor":
-        policy_config = _load_config(path)
-        trained = policy_config.action_feature
-        if trained is None or trained.shape != config.features["action"].shape:
-            raise PolicyError(
-                f"The policy {path} does not act in {config.action_space} space: its actions differ in length."
-            )
-        policy = make_policy(policy_config, env_cfg=config)
-        policy.eval()
-        overrides = {"device_processor": {"device": str(policy.config.device)}}
-        preprocess, postprocess = make_pre_post_processors(
-            policy_config, pretrained_path=str(path), preprocessor_overrides=overrides
-        )
-        return cls(policy, preprocess, postprocess)
-
-    def act(self, observation: dict[str, Any], task: str) -> np.ndarray:
-        """Return an action (N, dim) a row of the observation, N up to ``POLICY_ROWS``."""
-        batch: dict[str, Any] = {key: _filled(rows) for key, rows in preprocess_observation(observation).items()}
-        batch["task"] = [task] * POLICY_ROWS
-        with torch.inference_mode():
-            action = self.postprocess(self.policy.select_action(self.preprocess(batch)))
-        return action.cpu().numpy()
-
-
-def _filled(rows: torch.Tensor) -> torch.Tensor:
-    """Repeat the last row up to ``POLICY_ROWS`` rows."""
-    return torch.cat([rows, rows[-1:].expand(POLICY_ROWS - len(rows), *rows.shape[1:])])
-
-
-def _rollout(vector: SyncVectorEnv, actor: _Actor, seeds: list[int]) -> list[Episode]:
+def _rollout(vector: SyncVectorEnv, actor: Actor, seeds: list[int]) -> list[Episode]:
     """Run one episode a seed, side by side, until the last has ended."""
     n = vector.num_envs
     # An environment without a seed of its own repeats the last: its outcome is dropped.

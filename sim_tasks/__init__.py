@@ -1,5 +1,12 @@
 """MuJoCo tasks for a redundant arm, as Gymnasium environments ``sim_tasks/<Task>-v0``."""
 
+import os
+import sys
+
+# Read by MuJoCo when it is imported: without a display, only EGL (or OSMesa) can render.
+if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+    os.environ.setdefault("MUJOCO_GL", "egl")
+
 import gymnasium
 
 from sim_tasks.arm_task import ArmTask

@@ -14,7 +14,9 @@ from lerobot.policies.act.modeling_act import ACTPolicy
 from er_il import Arm, make_action_space
 from er_il.contract import Contract
 from er_il.errors import ErIlError, PolicyError, UnknownNameError
-from er_il.evaluation import Cell, Episode, evaluate, write_cells
+from er_il.evaluation import Cell, Episode, evaluate
+from er_il.results import load_cell, save_cell, write_cells
+from er_il.rollout import record_rollout
 
 PANDA = Arm.preset("panda")
 
@@ -120,3 +122,19 @@ def test_the_report_counts(tmp_path: Path):
         ("10", "1", ""),
     ]
     assert not list((tmp_path / "new").glob("*.partial"))
+
+
+def test_a_saved_cell_is_the_cell(tmp_path: Path):
+    cell = Cell("reach_cup", "erj", (episode(7), episode(8, "collision", 0.4)))
+    save_cell(cell, tmp_path / "new" / "cell.json")
+    assert load_cell(tmp_path / "new" / "cell.json") == cell
+
+
+def test_a_recorded_rollout_is_the_evaluated_one(policies: dict[str, Path]):
+    evaluated = evaluate(policies["erj"], "reach_cup", "erj", episodes=2).episodes[1]
+    pictures: list[np.ndarray] = []
+    trace = record_rollout(policies["erj"], "reach_cup", "erj", evaluated.seed, pictures.append)
+    assert trace.outcome == evaluated.failure
+    assert Counter(trace.status) == evaluated.statuses
+    assert len(pictures) == len(trace) + 1
+    assert pictures[0].shape == (720, 960, 3)

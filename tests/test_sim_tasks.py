@@ -135,9 +135,9 @@ def test_objects_can_be_placed_and_quaternions_do_not_jump() -> None:
 
 
 def test_wrong_names_list_the_valid_ones() -> None:
-    with pytest.raises(UnknownNameError, match="Unknown camera 'belly'. Valid: .*wrist"):
+    with pytest.raises(UnknownNameError, match=r"Unknown camera 'belly'. Valid: .*wrist"):
         gymnasium.make(IDS[0], cameras=("belly",))
-    with pytest.raises(UnknownNameError, match="Unknown object 'mug'. Valid: cup."):
+    with pytest.raises(UnknownNameError, match=r"Unknown object 'mug'. Valid: cup."):
         gymnasium.make(IDS[0]).reset(options={"state": {"mug": (0, 0, 0)}})
     with pytest.raises(ErIlError, match="Image size 0"):
         gymnasium.make(IDS[0], cameras=("wrist",), image_size=0)

@@ -29,8 +29,9 @@ def eval(
     from rich.console import Console
 
     from er_il.cli.progress import make_progress
-    from er_il.evaluation import evaluate, write_cells
+    from er_il.evaluation import evaluate
     from er_il.provenance import provenance
+    from er_il.results import write_cells
     from er_il.training import pretrained
 
     console = Console()
