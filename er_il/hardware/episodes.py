@@ -1,0 +1,33 @@
+"""How a device learns that LeRobot begins another episode: it listens to what LeRobot announces."""
+
+import logging
+
+ANNOUNCEMENT = "Recording episode"  # what lerobot-record and lerobot-rollout say aloud, and log
+
+
+class EpisodeAnnouncements(logging.Handler):
+    """Hears the stock commands announce episodes, as the person at the table does.
+
+    LeRobot tells neither robots nor teleoperators where an episode begins. Its commands do say so
+    to the operator, through the root logger; that is when a person has put the objects back, and
+    when the simulated world must start over.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(logging.INFO)
+        self.episode = 0  # of the session; as long as nothing is announced, the first
+        self._announced = 0
+
+    def listen(self) -> None:
+        """Start to listen, and to count from the first episode."""
+        self.episode = self._announced = 0
+        logging.getLogger().addHandler(self)
+
+    def stop(self) -> None:
+        """Stop listening."""
+        logging.getLogger().removeHandler(self)
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if record.getMessage().startswith(ANNOUNCEMENT):
+            self.episode = self._announced
+            self._announced += 1
