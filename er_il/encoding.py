@@ -1,146 +1,177 @@
 """Re-encoding: the same LeRobot dataset with its actions in another space, its videos shared."""
 
-import functools
-import os
-import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
-from lerobot.datasets import DEFAULT_EPISODES_PATH, aggregate_stats, write_stats
-from lerobot.datasets.compute_stats import compute_episode_stats
-from lerobot.datasets.feature_utils import get_hf_features_from_features
-from lerobot.datasets.io_utils import load_info, load_stats, write_info, write_table_one_row_group_per_episode
+from lerobot.datasets.io_utils import load_info
+from lerobot.datasets.utils import DatasetInfo
 from numpy.typing import NDArray
 
+from er_il.decoding import DecodedEpisode, Episode, decode_episodes
 from er_il.errors import DatasetError
-from er_il.schema import ACTION, LEADER_JOINTS, Feature, action_feature, action_spec
-from er_il.spaces import ActionSpace, JointSpace
+from er_il.layout import Layout
+from er_il.rewriting import Advance, Column, appearing, episode_slices, read_episode_numbers, read_vectors, rewrite
+from er_il.schema import ACTION, LEADER_JOINTS, SOURCE_ACTION, SPEC, STATE, Feature, action_feature, dimension_names
+from er_il.spaces import JointSpace
+from er_il.workers import cores
 
 Floats = NDArray[np.float32]
-Stats = dict[str, dict[str, NDArray[Any]]]
 
-_EPISODE = "episode_index"
-_EPISODES = Path(DEFAULT_EPISODES_PATH).parts[:2]  # meta/episodes
-_VIDEOS, _DATA = "videos", "data"
+VERSION = "v3."  # of LeRobot's format
 
 
-def encode_actions(joints: Floats, space: ActionSpace) -> Floats:
-    """Encode one episode's joint angles [rad] and gripper, (T, n + 1), as actions (T, dim).
+def encode_dataset(
+    source: Path,
+    target: Path,
+    layout: Layout,
+    *,
+    keep: bool = False,
+    finish: Callable[[Path], None] = lambda folder: None,
+    advance: Advance = lambda frames: None,
+) -> None:
+    """Write ``source`` again as ``target`` with its joint vectors encoded as actions by ``layout``.
 
-    A whole episode at once, so that rotations stay continuous within it.
-    """
-    return space.encode(joints[:, :-1], joints[:, -1]).astype(np.float32)
+    The joint vectors are those that were recorded, wherever the source holds them. Only the action
+    column, its feature and its statistics differ, and they are what LeRobot would have written had
+    the dataset been recorded in that space. The source stays as it is; the target appears only when
+    complete.
 
-
-def encode_dataset(source: Path, target: Path, space: ActionSpace) -> None:
-    """Write ``source`` again as ``target`` with actions in ``space``.
-
-    Only the action column, its feature and its statistics differ, and they are what LeRobot would
-    have written had the dataset been recorded in that space. Videos are hard links where the file
-    system allows. The source stays as it is; the target appears only when complete.
+    Args:
+        source: Folder of a LeRobot v3 dataset.
+        target: Folder that does not exist.
+        layout: What the joint vectors mean and how to encode them.
+        keep: Keep the joint vectors beside the encoded actions, in ``source.action``.
+        finish: Called with the target's folder before it takes its name.
+        advance: Called with the number of frames done since the last call.
 
     Raises:
-        DatasetError: the source is no LeRobot v3 dataset, or does not hold the joint angles of this arm.
+        DatasetError: the source is no LeRobot v3 dataset, or does not hold joint vectors of this layout.
         FileExistsError: the target exists.
     """
-    if target.exists():
-        raise FileExistsError(17, "The target exists already", str(target))
+    info = dataset_info(source)
+    column = joints_column(info.features, layout)
+    if column is None:
+        raise DatasetError(
+            "The dataset has no joint angles to encode: "
+            f"none of {LEADER_JOINTS}, {SOURCE_ACTION} and {ACTION} is named {', '.join(layout.names)}."
+        )
+    vectors = read_vectors(source, column)
+    with appearing(target) as partial:
+        columns = {ACTION: _encoded(source, info, layout, vectors)}
+        if keep and column == ACTION and layout.kind != JointSpace.kind:
+            columns[SOURCE_ACTION] = Column(_kept(info.features[ACTION], layout), vectors)
+        rewrite(source, partial, info, columns, advance)
+        finish(partial)
+
+
+def decode_dataset(
+    source: Path,
+    target: Path,
+    layout: Layout,
+    *,
+    finish: Callable[[Path], None] = lambda folder: None,
+    advance: Advance = lambda frames: None,
+) -> list[DecodedEpisode]:
+    """Write ``source`` again with its encoded actions decoded to joint vectors, then encoded by ``layout``.
+
+    Like :func:`encode_dataset`, but nothing of the source is read apart from its actions and the
+    measured joints, where IK starts.
+
+    Returns:
+        What became of each episode.
+
+    Raises:
+        DatasetError: the source does not say what its actions mean.
+        FileExistsError: the target exists.
+    """
+    info = dataset_info(source)
+    encoded_by = dataset_layout(info.features)
+    with appearing(target) as partial:
+        decoded = decode_episodes(encoded_by, read_episodes(source, info, encoded_by), cores(), advance)
+        vectors = np.concatenate([episode.vectors for episode in decoded]).astype(np.float32)
+        rewrite(source, partial, info, {ACTION: _encoded(source, info, layout, vectors)})
+        finish(partial)
+    return decoded
+
+
+def dataset_info(dataset: Path) -> DatasetInfo:
+    """Read the metadata of a LeRobot v3 dataset.
+
+    Raises:
+        DatasetError: it is none.
+    """
     try:
-        info = load_info(source)
+        info = load_info(dataset)
     except (FileNotFoundError, NotADirectoryError) as error:
-        raise DatasetError(f"{source} is not a LeRobot v3 dataset: it has no meta/info.json.") from error
-    column = _joints_column(info.features, space)
-    info.features[ACTION] = action_feature(space)
-    partial = target.with_name(target.name + ".partial")
-    shutil.rmtree(partial, ignore_errors=True)
-    _copy(source, partial)
-    schema = get_hf_features_from_features(info.features).arrow_schema
-    stats: dict[int, Stats] = {}
-    for path in _parquet_files(source / _DATA):
-        table, found = _encode_table(pq.read_table(path), column, space, schema)
-        stats |= {episode: compute_episode_stats({ACTION: rows}, info.features) for episode, rows in found.items()}
-        copy = partial / path.relative_to(source)
-        copy.parent.mkdir(parents=True, exist_ok=True)
-        write_table_one_row_group_per_episode(table, copy)
-    for path in _parquet_files(source.joinpath(*_EPISODES)):
-        copy = partial / path.relative_to(source)
-        copy.parent.mkdir(parents=True, exist_ok=True)
-        pq.write_table(_with_stats(pq.read_table(path), stats), copy)
-    # LeRobot adds one episode after the other; the same order gives the same digits.
-    total: Stats = functools.reduce(lambda sofar, each: aggregate_stats([sofar, each]), _in_order(stats))
-    write_stats((load_stats(source) or {}) | total, partial)
-    write_info(info, partial)
-    partial.rename(target)
+        raise DatasetError(f"{dataset} is not a LeRobot v3 dataset: it has no meta/info.json.") from error
+    except (TypeError, ValueError) as error:
+        raise DatasetError(f"{dataset} is not a LeRobot v3 dataset: its meta/info.json is damaged.") from error
+    if not info.codebase_version.startswith(VERSION):
+        raise DatasetError(
+            f"{dataset} is a LeRobot dataset of version {info.codebase_version}, not v3.0. Convert it first: "
+            "python -m lerobot.scripts.convert_dataset_v21_to_v30."
+        )
+    if info.total_frames == 0 or ACTION not in info.features:
+        raise DatasetError(f"{dataset} holds no actions.")
+    return info
 
 
-def _joints_column(columns: dict[str, Feature], space: ActionSpace) -> str:
-    """Name of the column that holds the arm's joint angles and gripper."""
-    names = list(JointSpace(space.arm).names)
-    for column in (LEADER_JOINTS, ACTION):
-        if column in columns and list(columns[column].get("names") or ()) == names:
-            if column == ACTION and action_spec(columns)["space"] != JointSpace.kind:
-                continue
-            return column
-    raise DatasetError(
-        f"The dataset has no joint angles to encode: neither {LEADER_JOINTS} nor {ACTION} is named {', '.join(names)}."
-    )
+def dataset_layout(features: dict[str, Feature]) -> Layout:
+    """Return what a dataset's actions mean.
+
+    Raises:
+        DatasetError: it does not say.
+        SpecError: it says so in terms that this version does not read.
+    """
+    spec = (features[ACTION].get("info") or {}).get(SPEC)
+    if spec is None:
+        raise DatasetError("The dataset does not say what its actions mean: er-il encode did not write it.")
+    return Layout.from_spec(spec)
 
 
-def _encode_table(
-    table: pa.Table, column: str, space: ActionSpace, schema: pa.Schema
-) -> tuple[pa.Table, dict[int, Floats]]:
-    """Replace the action column; also return each episode's actions."""
-    joints = np.stack(table.column(column).to_numpy()).astype(np.float32)
-    episodes = table.column(_EPISODE).to_numpy()
-    starts = np.flatnonzero(np.diff(episodes, prepend=-1))
-    actions = {
-        int(episodes[start]): encode_actions(rows, space)
-        for start, rows in zip(starts, np.split(joints, starts[1:]), strict=True)
-    }
-    field = schema.field(ACTION)
-    values = pa.array(np.concatenate(list(actions.values())).tolist(), type=field.type)
-    table = table.set_column(table.schema.get_field_index(ACTION), field, values)
-    return table.replace_schema_metadata(schema.metadata), actions
+def joints_column(features: dict[str, Feature], layout: Layout) -> str | None:
+    """Name of the column that holds the joint vectors as recorded, if there is one."""
+    for column in (LEADER_JOINTS, SOURCE_ACTION, ACTION):
+        if column in features and dimension_names(features[column]) == layout.names:
+            spec = (features[column].get("info") or {}).get(SPEC)
+            if column != ACTION or spec is None or spec["space"] == JointSpace.kind:
+                return column
+    return None
 
 
-def _with_stats(episodes: pa.Table, stats: dict[int, Stats]) -> pa.Table:
-    """Replace the statistics of the actions in a table of episodes."""
-    rows = [stats[episode][ACTION] for episode in episodes.column(_EPISODE).to_pylist()]
-    for name in rows[0]:
-        column, values = f"stats/{ACTION}/{name}", pa.array([row[name].tolist() for row in rows])
-        index = episodes.schema.get_field_index(column)
-        episodes = episodes.append_column(column, values) if index < 0 else episodes.set_column(index, column, values)
-    return episodes
+def read_episodes(dataset: Path, info: DatasetInfo, layout: Layout, truth: str | None = None) -> list[Episode]:
+    """Read the actions, the measured joints, and the column ``truth`` of joint vectors, if any."""
+    frames = episode_slices(read_episode_numbers(dataset))
+    actions = read_vectors(dataset, ACTION).astype(np.float64)
+    state = _measured(dataset, info, layout)
+    vectors = None if truth is None else read_vectors(dataset, truth).astype(np.float64)
+    return [
+        Episode(actions[rows], *(None if array is None else array[rows] for array in (state, vectors)))
+        for rows in frames
+    ]
 
 
-def _in_order(stats: dict[int, Stats]) -> Iterator[Stats]:
-    return (stats[episode] for episode in sorted(stats))
+def _measured(dataset: Path, info: DatasetInfo, layout: Layout) -> NDArray[np.float64] | None:
+    """Measured joint vectors (N, D), NaN in dimensions that belong to no arm; None unless all arms are measured."""
+    names = dimension_names(info.features[STATE]) if STATE in info.features else ()
+    if not all(part.motors.state and set(part.motors.state) <= set(names) for part in layout.parts):
+        return None
+    state = read_vectors(dataset, STATE)
+    measured = np.full((len(state), len(layout.names)), np.nan)
+    for part in layout.parts:
+        measured[:, layout.indices(part)] = state[:, [names.index(name) for name in part.motors.state]]
+    return measured
 
 
-def _copy(source: Path, target: Path) -> None:
-    """Copy all that does not depend on the actions; link the videos."""
-    shutil.copytree(source, target, ignore=_except(source, {_DATA, _VIDEOS, str(Path(*_EPISODES))}))
-    if (source / _VIDEOS).exists():
-        shutil.copytree(source / _VIDEOS, target / _VIDEOS, copy_function=_link)
+def _encoded(source: Path, info: DatasetInfo, layout: Layout, vectors: Floats) -> Column:
+    """Encode joint vectors, an episode at a time so that rotations stay continuous within it."""
+    episodes = [layout.encode(vectors[rows]) for rows in episode_slices(read_episode_numbers(source))]
+    recorded = info.features[ACTION]
+    feature = recorded | action_feature(layout)
+    feature["info"] = (recorded.get("info") or {}) | feature["info"]
+    return Column(feature, np.concatenate(episodes).astype(np.float32))
 
 
-def _except(root: Path, folders: set[str]) -> Callable[[str, list[str]], set[str]]:
-    def ignored(folder: str, names: list[str]) -> set[str]:
-        return {name for name in names if str((Path(folder) / name).relative_to(root)) in folders}
-
-    return ignored
-
-
-def _link(source: str, target: str) -> None:
-    try:
-        os.link(source, target)
-    except OSError:  # another file system, or one without hard links
-        shutil.copy2(source, target)
-
-
-def _parquet_files(folder: Path) -> list[Path]:
-    return sorted(folder.glob("*/*.parquet"))
+def _kept(recorded: Feature, layout: Layout) -> Feature:
+    return recorded | {"dtype": "float32", "names": list(layout.names), "info": None}

@@ -20,8 +20,9 @@ from rich.progress import Progress
 
 from er_il.arm import Arm
 from er_il.demos import Demo, collect, demo_path, make_world
-from er_il.encoding import encode_actions, encode_dataset
+from er_il.encoding import encode_dataset
 from er_il.errors import DatasetError, UnknownNameError
+from er_il.layout import Layout
 from er_il.recipe import Recipe
 from er_il.record import Record
 from er_il.schema import ACTION, DEMO_SEED, ENVIRONMENT_STATE, IMAGES, LEADER_JOINTS, STATE, features
@@ -72,7 +73,7 @@ def generate(recipe: Recipe, spaces: Sequence[str], out: Path, progress: Progres
             _record(recipe, new[0], first, work, progress, workers)
         if missing := [space for space in new if out / space != first]:
             for space in progress.track(missing, description="Encode in the other spaces"):
-                encode_dataset(first, out / space, make_action_space(space, Arm.preset(recipe.arm)))
+                encode_dataset(first, out / space, Layout.of_space(make_action_space(space, Arm.preset(recipe.arm))))
         shutil.rmtree(work, ignore_errors=True)
     return Generated({space: out / space for space in asked}, new, Record.read(first).dropped)
 
@@ -130,7 +131,7 @@ class _Writer:
         )
 
     def add(self, demo: Demo) -> None:
-        actions = encode_actions(demo.joints, self._space)
+        actions = Layout.of_space(self._space).encode(demo.joints).astype(np.float32)
         for step in range(len(demo)):
             frame = {
                 ACTION: actions[step],

@@ -1,9 +1,11 @@
 """The columns of er_il's datasets, in LeRobot's terms (the card ``datasets/README.md`` explains them)."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
 from er_il.errors import DatasetError
+from er_il.layout import Layout
 from er_il.spaces import ActionSpace
 
 ACTION = "action"
@@ -13,8 +15,9 @@ IMAGES = "observation.images."
 # Side columns. LeRobot makes every action* column a policy output and every observation* column an input.
 LEADER_JOINTS = "leader.joints"
 DEMO_SEED = "demo.seed"
+SOURCE_ACTION = "source.action"  # in a dataset re-encoded from another: its actions as they were
 
-SPEC = "er_il"  # features["action"]["info"][SPEC] is ActionSpace.spec()
+SPEC = "er_il"  # features["action"]["info"][SPEC] is Layout.spec(), for er_il's own ActionSpace.spec()
 
 Feature = dict[str, Any]
 
@@ -30,7 +33,7 @@ def features(
     joint_names = tuple(f"{joint}.pos" for joint in space.arm.joints)
     image = {"dtype": "video", "shape": (image_size, image_size, 3), "names": ["height", "width", "channels"]}
     return {
-        ACTION: action_feature(space),
+        ACTION: action_feature(Layout.of_space(space)),
         STATE: _vector(state_names),
         ENVIRONMENT_STATE: _vector(environment_state_names),
         LEADER_JOINTS: _vector((*joint_names, "gripper")),
@@ -39,9 +42,18 @@ def features(
     }
 
 
-def action_feature(space: ActionSpace) -> Feature:
-    """Describe the action column of a space; its specification travels in ``info``."""
-    return _vector(space.names) | {"info": {SPEC: space.spec()}}
+def action_feature(layout: Layout) -> Feature:
+    """Describe the action column of a layout; its specification travels in ``info``."""
+    return _vector(layout.encoded_names) | {"info": {SPEC: layout.spec()}}
+
+
+def dimension_names(feature: Feature) -> tuple[str, ...]:
+    """Names of a column's dimensions; their numbers if it names none."""
+    names = feature.get("names")
+    if isinstance(names, Mapping):  # such as {"motors": [...]}, which older datasets have
+        names = [name for group in names.values() for name in group]
+    count = math.prod(feature["shape"])
+    return tuple(map(str, names)) if names and len(names) == count else tuple(map(str, range(count)))
 
 
 def action_spec(columns: Mapping[str, Feature]) -> dict[str, Any]:

@@ -7,8 +7,9 @@ import pytest
 from lerobot.datasets import LeRobotDataset
 
 from er_il.arm import Arm
-from er_il.encoding import encode_actions, encode_dataset
+from er_il.encoding import encode_dataset
 from er_il.errors import DatasetError
+from er_il.layout import Layout
 from er_il.schema import ACTION, LEADER_JOINTS, action_feature
 from er_il.spaces import make_action_space
 
@@ -27,19 +28,23 @@ def _episodes():
 
 def _write(root, kind, leader=False):
     """Write the episodes with LeRobot itself, actions in the space ``kind``."""
-    space = make_action_space(kind, PANDA)
-    columns = {ACTION: action_feature(space), "observation.state": _state()}
+    layout = _layout(kind)
+    columns = {ACTION: action_feature(layout), "observation.state": _state()}
     if leader:
-        columns[LEADER_JOINTS] = action_feature(make_action_space("joint", PANDA)) | {"info": None}
+        columns[LEADER_JOINTS] = action_feature(_layout("joint")) | {"info": None}
     dataset = LeRobotDataset.create("er_il/test", 20, columns, root=root, video_backend="pyav")
     for joints in _episodes():
-        actions = encode_actions(joints, space)
+        actions = layout.encode(joints).astype(np.float32)
         for t, row in enumerate(joints):
             frame = {ACTION: actions[t], "observation.state": np.float32([t, 2 * t]), "task": "turn"}
             dataset.add_frame(frame | ({LEADER_JOINTS: row} if leader else {}))
         dataset.save_episode()
     dataset.finalize()
     return root
+
+
+def _layout(kind):
+    return Layout.of_space(make_action_space(kind, PANDA))
 
 
 def _state():
@@ -54,7 +59,7 @@ def joint(tmp_path_factory):
 @pytest.mark.parametrize("kind", ["erj", "task"])
 def test_re_encoding_equals_recording_in_that_space(joint, tmp_path, kind):
     native = _write(tmp_path / "native", kind)
-    encode_dataset(joint, tmp_path / "encoded", make_action_space(kind, PANDA))
+    encode_dataset(joint, tmp_path / "encoded", _layout(kind))
     encoded = tmp_path / "encoded"
     _assert_same_data(encoded, native)
     assert (encoded / "meta/info.json").read_bytes() == (native / "meta/info.json").read_bytes()
@@ -69,7 +74,7 @@ def test_the_source_is_untouched_and_leftovers_are_cleared(joint, tmp_path):
     before = _hashes(joint)
     (tmp_path / "encoded.partial" / "data").mkdir(parents=True)
     (tmp_path / "encoded.partial" / "data" / "half.parquet").write_bytes(b"half")
-    encode_dataset(joint, tmp_path / "encoded", make_action_space("erj", PANDA))
+    encode_dataset(joint, tmp_path / "encoded", _layout("erj"))
     assert _hashes(joint) == before
     assert [path.name for path in tmp_path.iterdir()] == ["encoded"]
     assert not list(tmp_path.rglob("half.parquet"))
@@ -77,13 +82,13 @@ def test_the_source_is_untouched_and_leftovers_are_cleared(joint, tmp_path):
 
 def test_the_recorded_joints_survive_any_chain_of_encodings(tmp_path):
     first = _write(tmp_path / "first", "joint", leader=True)
-    encode_dataset(first, tmp_path / "task", make_action_space("task", PANDA))  # drops the elbow
-    encode_dataset(tmp_path / "task", tmp_path / "back", make_action_space("joint", PANDA))
+    encode_dataset(first, tmp_path / "task", _layout("task"))  # drops the elbow
+    encode_dataset(tmp_path / "task", tmp_path / "back", _layout("joint"))
     _assert_same_data(tmp_path / "back", first)
 
 
 def test_quaternions_are_continuous_within_and_start_afresh_in_each_episode(joint, tmp_path):
-    encode_dataset(joint, tmp_path / "task", make_action_space("task", PANDA))
+    encode_dataset(joint, tmp_path / "task", _layout("task"))
     dataset = LeRobotDataset("er_il/test", root=tmp_path / "task", video_backend="pyav")
     quaternions = np.stack(dataset.hf_dataset[ACTION])[:, 3:7]
     one, other = np.split(quaternions, [LENGTHS[0]])
@@ -94,7 +99,7 @@ def test_quaternions_are_continuous_within_and_start_afresh_in_each_episode(join
 
 
 def test_datasets_that_cannot_be_encoded(joint, tmp_path):
-    erj = make_action_space("erj", PANDA)
+    erj = _layout("erj")
     task = _write(tmp_path / "task", "task")
     with pytest.raises(DatasetError, match="no joint angles"):
         encode_dataset(task, tmp_path / "out", erj)
