@@ -27,6 +27,7 @@ class Command:
     status: Status  # of the action it came from
     latency: float  # [s] time the decoding took
     joint_step: float  # [rad] largest joint change that was asked for, before the velocity limit
+    followed: bool  # the arm goes where the action says, or as near as it can; else the last command stands
     stopped: bool = False  # the arm holds until the next reset
 
 
@@ -80,6 +81,12 @@ class Commander:
 
     def reset(self, q: ArrayLike, gripper: float = 1.0) -> None:
         """Start an episode from the measured joint angles q (n,) [rad] and gripper opening."""
+        self.anchor(q, gripper)
+        self._stopped = False
+        self.tally = Tally()
+
+    def anchor(self, q: ArrayLike, gripper: float = 1.0) -> None:
+        """Go on from joint angles q (n,) [rad], wherever the last command was: something else moved the arm."""
         arm = self.space.arm
         start = np.array(q, dtype=np.float64)
         if start.shape != (arm.dof,):
@@ -88,8 +95,19 @@ class Commander:
             raise ErIlError("The measured joint angles are not finite; no safe command can start from them.")
         self._last = np.clip(start, arm.lower, arm.upper)
         self._gripper = float(np.clip(gripper, 0.0, 1.0))
-        self._stopped = False
-        self.tally = Tally()
+
+    def stop(self) -> None:
+        """Let the last command stand until the next reset."""
+        self._stopped = True
+
+    def strayed(self, q: ArrayLike) -> bool:
+        """Whether the arm is elsewhere than any command of these periods could have left it.
+
+        A person moved it, or another program: the velocity limit must then count from where it is.
+        """
+        assert self._last is not None
+        way = np.abs(np.asarray(q, dtype=np.float64) - self._last)
+        return bool(np.any(way > JUMP_PERIODS * self._reach))
 
     def command(self, action: ArrayLike, q: ArrayLike) -> Command:
         """Turn an action (dim,) into the next command, given the measured joint angles q (n,) [rad]."""
@@ -101,20 +119,21 @@ class Commander:
         self._stopped |= self.on_invalid == STOP and status is not Status.OK
         asked = float(np.max(np.abs(target - self._last)))
         follows = status is Status.OK or (self.on_invalid == BEST_EFFORT and status is not Status.INVALID)
-        if follows and not self._stopped:
+        follows = follows and not self._stopped
+        if follows:
             self._last = self._limited(self._last, target)
             self._gripper = gripper
         self.tally.statuses[status] += 1
         self.tally.latencies.append(latency)
         self.tally.largest_step = max(self.tally.largest_step, asked)
-        return Command(self._last.copy(), self._gripper, status, latency, asked, self._stopped)
+        return Command(self._last.copy(), self._gripper, status, latency, asked, follows, self._stopped)
 
     def _decode(self, action: ArrayLike, q: ArrayLike) -> tuple[Vector, float, Status]:
         measured = np.asarray(q, dtype=np.float64)
         assert self._last is not None
         if not np.all(np.isfinite(measured)):
             return self._last, self._gripper, Status.INVALID
-        decoded = self.space.decode(action, seed=measured)
+        decoded = self.space.decode(action, seed=measured, current=self._last)
         if decoded.status is Status.INVALID:
             return self._last, self._gripper, Status.INVALID
         far = np.any(np.abs(decoded.q - measured) > JUMP_PERIODS * self._reach)

@@ -23,6 +23,9 @@ from er_il.spaces import ActionSpace
 PREFIX = "er_il:"
 NONE = "-"
 
+# Name of the post-processing step that `er-il attach` gives a policy, to decode for a robot by itself.
+DECODE_POLICY_ACTION = "er_il_decode_policy_action"
+
 
 @dataclass(frozen=True)
 class Contract:
@@ -102,13 +105,27 @@ def check_policy(policy: str | Path, space: ActionSpace) -> None:
     """Refuse a policy whose actions are not those of ``space``.
 
     Raises:
-        PolicyError: it was trained for something else; says what differs.
+        PolicyError: it was trained for something else, and says what differs; or decodes by itself.
     """
+    if decodes(policy):
+        raise PolicyError(
+            f"The policy {policy} decodes its actions by itself, for a robot (er-il attach). "
+            "Evaluate the policy that it was made from."
+        )
     got, needed = policy_contract(policy), Contract.of_space(space)
     different = [part.name for part in fields(Contract) if getattr(got, part.name) != getattr(needed, part.name)]
     if different:
         differences = ", ".join(f"{name} {getattr(got, name)!r} not {getattr(needed, name)!r}" for name in different)
         raise PolicyError(f"The policy {policy} was trained for another action space: {differences}.")
+
+
+def decodes(policy: str | Path) -> bool:
+    """Whether a policy in a folder decodes its actions by itself (see :mod:`er_il.attachment`)."""
+    try:
+        steps = json.loads((Path(policy) / "policy_postprocessor.json").read_text())["steps"]
+        return any(step.get("registry_name") == DECODE_POLICY_ACTION for step in steps)
+    except (OSError, ValueError, KeyError):
+        return False
 
 
 def _of_dataset(policy: Path) -> Contract | None:
