@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import yaml
+
 from er_il.contract import Contract, dataset_info
 from er_il.errors import DatasetError, PolicyError, UnknownNameError
 from er_il.recipe import TRAIN
@@ -112,6 +114,18 @@ class Training:
 def default_config(space: str) -> Path:
     """Return the configuration that ships for a space, state-based."""
     return data_dir("configs") / f"act_{space}.yaml"
+
+
+def default_steps(config: Path) -> int:
+    """Return the number of steps that a configuration asks for.
+
+    Raises:
+        PolicyError: the configuration is missing or does not say.
+    """
+    try:
+        return int(yaml.safe_load(config.read_text())["steps"])
+    except (OSError, yaml.YAMLError, KeyError, TypeError, ValueError) as error:
+        raise PolicyError(f"There is no training configuration {config} that says how many steps to take.") from error
 
 
 def executable(command: Sequence[str]) -> list[str]:

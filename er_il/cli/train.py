@@ -9,7 +9,7 @@ def train(
     task: Positional[str],
     space: Positional[str],
     *,
-    steps: int = 1000,
+    steps: int | None = None,
     seed: int = 0,
     dataset: Path | None = None,
     config: Path | None = None,
@@ -22,7 +22,7 @@ def train(
     Args:
         task: Task, such as reach_cup.
         space: Action space of the dataset: joint, task, erj.
-        steps: Training steps.
+        steps: Training steps; the configuration's if omitted.
         seed: Seed of the training.
         dataset: Folder of the dataset; datasets/<task>/<space> if omitted.
         config: Configuration of the training; configs/act_<space>.yaml if omitted.
@@ -35,18 +35,19 @@ def train(
     from er_il.errors import UnknownNameError
     from er_il.spaces import SPACES
     from er_il.tasks import task_id
-    from er_il.training import Training, default_config, executable
+    from er_il.training import Training, default_config, default_steps, executable
 
     task_id(task)
     if space not in SPACES:
         raise UnknownNameError("action space", space, SPACES)
+    chosen = config or default_config(space)
     training = Training(
         task=task,
         space=space,
         dataset=dataset or Path("datasets") / task / space,
         out=out or Path("policies") / task / space,
-        config=config or default_config(space),
-        steps=steps,
+        config=chosen,
+        steps=default_steps(chosen) if steps is None else steps,
         seed=seed,
     )
     if training.finished:
