@@ -1,6 +1,8 @@
 """A trained policy with its processors, and the environment it was trained for."""
 
+import io
 from collections.abc import Callable
+from contextlib import redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -70,7 +72,8 @@ class Actor:
             raise PolicyError(
                 f"The policy {path} does not act in {config.action_space} space: its actions differ in length."
             )
-        policy = make_policy(policy_config, env_cfg=config)
+        with redirect_stdout(io.StringIO()):  # LeRobot announces every file it loads
+            policy = make_policy(policy_config, env_cfg=config)
         policy.eval()
         overrides = {"device_processor": {"device": str(policy.config.device)}}
         preprocess, postprocess = make_pre_post_processors(

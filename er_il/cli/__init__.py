@@ -12,10 +12,14 @@ from er_il.errors import ErIlError
 # Command -> module under er_il.cli that holds a function of the command's name. Their heavy
 # imports (torch, MuJoCo, Rerun) wait inside the functions, so that help is instant.
 COMMANDS: dict[str, str] = {
+    "attach": "attach",
+    "demo": "demo",
+    "encode": "encode",
     "eval": "eval",
     "generate": "generate",
     "replay": "replay",
     "train": "train",
+    "verify": "verify",
 }
 
 USER_MISTAKE = 2  # exit code, as for unknown options

@@ -1,0 +1,174 @@
+"""The main job in one call: demonstrations, a policy for each space, rollouts, and a report.
+
+Every stage leaves its result in the output folder and is not done again: interrupted, the same call
+goes on where it was. Training and rollouts run side by side, one thread each.
+"""
+
+import json
+import os
+import re
+import subprocess
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from rich.progress import Progress, TaskID
+
+from er_il.actor import POLICY_ROWS
+from er_il.decoders import decoder
+from er_il.errors import ErIlError
+from er_il.evaluation import FIRST_SEED, Cell, evaluate
+from er_il.recipe import Recipe
+from er_il.recording import generate
+from er_il.results import load_cell, save_cell
+from er_il.training import Training, default_config, executable
+from er_il.workers import worker_pool
+
+TASK = "reach_cup"
+DECODERS = ("joint", "erj", "task-nearest", "task-posture")
+EPISODES = 50  # rollouts a decoder
+STEPS = 1000  # of training a policy
+POLL = 0.5  # [s] between looks at the trainings' logs
+
+_LOGGED_STEP = re.compile(r"step:([\d.]+)(K?)")  # as lerobot-train logs it
+
+
+@dataclass(frozen=True)
+class Demo:
+    """One run of the demo, in a folder that belongs to one seed and one set of decoders."""
+
+    out: Path
+    seed: int
+    task: str = TASK
+    decoders: tuple[str, ...] = DECODERS
+
+    @property
+    def spaces(self) -> tuple[str, ...]:
+        """The action spaces that the decoders read, each once."""
+        return tuple(dict.fromkeys(decoder(name).space for name in self.decoders))
+
+    def dataset(self, space: str) -> Path:
+        """Folder of a space's dataset."""
+        return self.out / "datasets" / self.task / space
+
+    def training(self, space: str) -> Training:
+        """The training of a space's policy."""
+        return Training(
+            task=self.task,
+            space=space,
+            dataset=self.dataset(space),
+            out=self.out / "policies" / self.task / space,
+            config=default_config(space),
+            steps=STEPS,
+            seed=self.seed,
+        )
+
+    def claim(self) -> None:
+        """Make the folder this run's own.
+
+        Raises:
+            ErIlError: it holds another run's results.
+        """
+        owner = self.out / "demo.json"
+        mine = {"task": self.task, "seed": self.seed, "decoders": list(self.decoders)}
+        if owner.exists():
+            found = json.loads(owner.read_text())
+            if found != mine:
+                raise ErIlError(f"{self.out} holds the demo {found}, not {mine}; choose another --out, or delete it.")
+            return
+        if self.out.exists() and any(self.out.iterdir()):
+            raise ErIlError(f"{self.out} holds something else than a demo; choose another --out.")
+        self.out.mkdir(parents=True, exist_ok=True)
+        owner.write_text(json.dumps(mine))
+
+    def run(self, progress: Progress, workers: int) -> list[Cell]:
+        """Do all that is not done yet; return a cell a decoder."""
+        self.claim()
+        recipe = replace(Recipe.load(self.task), seed=self.seed)
+        generate(recipe, self.spaces, self.out / "datasets" / self.task, progress, workers)
+        with worker_pool(workers, _one_thread) as pool:
+            _Schedule(self, pool, progress).run()
+        return [self._cell(name) for name in self.decoders]
+
+    def chunks(self, name: str) -> list[tuple[Path, int, int]]:
+        """The rollouts of a decoder in jobs: where the result goes, the first seed, how many."""
+        folder = self.out / "rollouts"
+        return [
+            (folder / f"{name}-{start}.json", FIRST_SEED + start, min(POLICY_ROWS, EPISODES - start))
+            for start in range(0, EPISODES, POLICY_ROWS)
+        ]
+
+    def _cell(self, name: str) -> Cell:
+        cells = [load_cell(path) for path, _, _ in self.chunks(name)]
+        return Cell(self.task, name, tuple(episode for cell in cells for episode in cell.episodes))
+
+
+class _Schedule:
+    """Runs trainings first; as soon as a policy is there, its rollouts."""
+
+    def __init__(self, demo: Demo, pool: ProcessPoolExecutor, progress: Progress) -> None:
+        self._demo, self._pool, self._progress = demo, pool, progress
+        self._trainings: dict[Future[None], tuple[Training, TaskID]] = {}
+        self._rollouts: dict[Future[None], tuple[TaskID, int]] = {}
+        self._bars = {name: progress.add_task(f"Roll out {name}", total=EPISODES) for name in demo.decoders}
+
+    def run(self) -> None:
+        for space in self._demo.spaces:
+            training = self._demo.training(space)
+            bar = self._progress.add_task(f"Train {space}", total=training.steps)
+            self._trainings[self._pool.submit(_train, training)] = training, bar
+        while self._trainings or self._rollouts:
+            done, _ = wait([*self._trainings, *self._rollouts], timeout=POLL, return_when=FIRST_COMPLETED)
+            for future in done:
+                future.result()  # raises what the job raised
+                if future in self._trainings:
+                    training, bar = self._trainings.pop(future)
+                    self._progress.update(bar, completed=training.steps)
+                    self._roll_out(training)
+                else:
+                    bar, count = self._rollouts.pop(future)
+                    self._progress.advance(bar, count)
+            for training, bar in self._trainings.values():
+                self._progress.update(bar, completed=_logged_steps(training))
+
+    def _roll_out(self, training: Training) -> None:
+        for name in self._demo.decoders:
+            if decoder(name).space == training.space:
+                for path, seed, count in self._demo.chunks(name):
+                    job = self._pool.submit(_evaluate, training.policy, self._demo.task, name, seed, count, path)
+                    self._rollouts[job] = self._bars[name], count
+
+
+def _one_thread() -> None:
+    # More threads than cores make the small matrices of these policies ten times slower.
+    os.environ["OMP_NUM_THREADS"] = "1"
+
+
+def _train(training: Training) -> None:
+    if training.finished:
+        return
+    training.clear()
+    log = _log(training)
+    log.parent.mkdir(parents=True, exist_ok=True)
+    with log.open("w") as file:
+        finished = subprocess.run(executable(training.command), stdout=file, stderr=subprocess.STDOUT, check=False)
+    if finished.returncode:
+        raise ErIlError(f"The training of {training.space} failed; see {log}.")
+
+
+def _evaluate(policy: Path, task: str, name: str, seed: int, count: int, path: Path) -> None:
+    if not path.exists():
+        save_cell(evaluate(policy, task, name, episodes=count, seed=seed), path)
+
+
+def _log(training: Training) -> Path:
+    return training.out.with_name(f"{training.space}.log")
+
+
+def _logged_steps(training: Training) -> int:
+    """Number of steps that a running training has reported."""
+    try:
+        steps = _LOGGED_STEP.findall(_log(training).read_text())
+    except OSError:
+        return 0
+    return int(float(steps[-1][0]) * (1000 if steps[-1][1] else 1)) if steps else 0
