@@ -7,6 +7,7 @@ from lerobot.policies.act.configuration_act import ACTConfig
 from er_il import Arm, make_action_space
 from er_il.contract import Contract, check_policy, policy_contract
 from er_il.errors import PolicyError
+from er_il.layout import Layout
 from er_il.resources import data_dir
 from er_il.schema import action_feature
 from er_il.spaces import ActionSpace
@@ -25,7 +26,9 @@ def policy(folder: Path, *, tags: list[str] | None = None, dataset: Path | None 
 
 def dataset(folder: Path, space: ActionSpace) -> Path:
     (folder / "meta").mkdir(parents=True)
-    (folder / "meta" / "info.json").write_text(json.dumps({"features": {"action": action_feature(space)}}))
+    (folder / "meta" / "info.json").write_text(
+        json.dumps({"features": {"action": action_feature(Layout.of_space(space))}})
+    )
     return folder
 
 
