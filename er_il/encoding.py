@@ -27,6 +27,7 @@ def encode_dataset(
     layout: Layout,
     *,
     keep: bool = False,
+    fit: bool = False,
     finish: Callable[[Path], None] = lambda folder: None,
     advance: Advance = lambda frames: None,
 ) -> None:
@@ -41,6 +42,7 @@ def encode_dataset(
         source: Folder of a LeRobot v3 dataset.
         target: Folder that does not exist.
         layout: What the joint vectors mean and how to encode them.
+        fit: Choose the signs of quaternions and turns of arm angles from the data.
         keep: Keep the joint vectors beside the encoded actions, in ``source.action``.
         finish: Called with the target's folder before it takes its name.
         advance: Called with the number of frames done since the last call.
@@ -57,6 +59,7 @@ def encode_dataset(
             f"none of {LEADER_JOINTS}, {SOURCE_ACTION} and {ACTION} is named {', '.join(layout.names)}."
         )
     vectors = read_vectors(source, column)
+    layout = layout.fitted(vectors) if fit else layout
     with appearing(target) as partial:
         columns = {ACTION: _encoded(source, info, layout, vectors)}
         if keep and column == ACTION and layout.kind != JointSpace.kind:
@@ -76,7 +79,7 @@ def decode_dataset(
     """Write ``source`` again with its encoded actions decoded to joint vectors, then encoded by ``layout``.
 
     Like :func:`encode_dataset`, but nothing of the source is read apart from its actions and the
-    measured joints, where IK starts.
+    measured joints, where IK starts. Signs and turns are chosen from the data.
 
     Returns:
         What became of each episode.
@@ -90,7 +93,7 @@ def decode_dataset(
     with appearing(target) as partial:
         decoded = decode_episodes(encoded_by, read_episodes(source, info, encoded_by), cores(), advance)
         vectors = np.concatenate([episode.vectors for episode in decoded]).astype(np.float32)
-        rewrite(source, partial, info, {ACTION: _encoded(source, info, layout, vectors)})
+        rewrite(source, partial, info, {ACTION: _encoded(source, info, layout.fitted(vectors), vectors)})
         finish(partial)
     return decoded
 

@@ -71,6 +71,8 @@ class Layout:
                     f"{part.space.arm.name} has {part.space.arm.dof} joints ({', '.join(part.space.arm.joints)}), "
                     f"but {len(part.motors.joints)} dimensions are given: {', '.join(part.motors.joints)}."
                 )
+        if len(set(self.encoded_names)) != len(self.encoded_names):
+            raise DatasetError(f"Encoded, two dimensions would have one name: {', '.join(self.encoded_names)}.")
 
     @classmethod
     def of_space(cls, space: ActionSpace) -> "Layout":
@@ -102,7 +104,11 @@ class Layout:
 
     def indices(self, part: Part) -> list[int]:
         """Positions of an arm's joints in the joint vector."""
-        return [self.names.index(joint) for joint in part.motors.joints]
+        return self._indices[part.label]
+
+    @cached_property
+    def _indices(self) -> dict[str, list[int]]:
+        return {part.label: [self.names.index(joint) for joint in part.motors.joints] for part in self.parts}
 
     def angles(self, part: Part, vectors: ArrayLike) -> Array:
         """Angles (..., n) [rad] of an arm in joint vectors (..., D)."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -53,11 +54,11 @@ class Motors:
         """The robot's values (..., n) from angles (..., n) [rad]."""
         return (np.asarray(angles, dtype=np.float64) / UNITS[self.units] - self._offsets) * self._signs
 
-    @property
+    @cached_property
     def _signs(self) -> Array:
         return np.array(self.signs) if self.signs else np.ones(len(self.joints))
 
-    @property
+    @cached_property
     def _offsets(self) -> Array:
         return np.array(self.offsets) if self.offsets else np.zeros(len(self.joints))
 
@@ -68,4 +69,5 @@ class Motors:
     @classmethod
     def from_spec(cls, spec: Mapping[str, Any]) -> "Motors":
         """Rebuild what :meth:`spec` described."""
-        return cls(**{name: value if isinstance(value, str) else tuple(value) for name, value in spec.items()})
+        signs, offsets, state = (tuple(spec[name]) for name in ("signs", "offsets", "state"))
+        return cls(tuple(spec["joints"]), spec["units"], signs, offsets, state)

@@ -110,7 +110,7 @@ def rewrite(
         done = rows.stop
         values = {name: column.values[rows] for name, column in columns.items()}
         for frames in episode_slices(table.column(EPISODE).to_numpy()):
-            episode = {name: array[frames] for name, array in values.items()}
+            episode: dict[str, list[str] | NDArray[Any]] = {name: array[frames] for name, array in values.items()}
             stats[table.column(EPISODE)[frames.start].as_py()] = compute_episode_stats(episode, info.features)
             advance(frames.stop - frames.start)
         write_table_one_row_group_per_episode(_with_columns(table, values, schema), _new(target, source, path))

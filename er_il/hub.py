@@ -1,0 +1,26 @@
+"""Datasets by name: folders, or LeRobot's repository ids, which LeRobot itself looks up and downloads."""
+
+from pathlib import Path
+
+from lerobot.datasets import LeRobotDataset
+
+from er_il.errors import DatasetError
+
+
+def find_dataset(source: str) -> Path:
+    """Folder of a dataset.
+
+    Args:
+        source: A folder, or a repository id such as ``lerobot/pusht``.
+
+    Raises:
+        DatasetError: there is no such dataset, or it cannot be downloaded.
+    """
+    folder = Path(source)
+    if folder.exists() or folder.is_absolute() or source.count("/") != 1:
+        return folder  # whoever reads it says what is wrong with it
+    try:
+        return Path(LeRobotDataset(source, video_backend="pyav").root)
+    except (OSError, ValueError, NotImplementedError) as error:  # huggingface_hub's errors derive from these
+        reason = (str(error).strip() or type(error).__name__).splitlines()[0]
+        raise DatasetError(f"{source} is neither a folder nor a dataset that LeRobot can load: {reason}") from error
