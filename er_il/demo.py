@@ -21,14 +21,21 @@ from er_il.evaluation import FIRST_SEED, Cell, evaluate
 from er_il.recipe import Recipe
 from er_il.recording import generate
 from er_il.results import load_cell, save_cell
-from er_il.training import Training, default_config, executable
+from er_il.showing import film_rollouts, telling_seed, write_report
+from er_il.training import Training, default_config, default_steps, executable
 from er_il.workers import worker_pool
 
 TASK = "reach_cup"
 DECODERS = ("joint", "erj", "task-nearest", "task-posture")
 EPISODES = 50  # rollouts a decoder
-STEPS = 1000  # of training a policy
 POLL = 0.5  # [s] between looks at the trainings' logs
+
+INTRODUCTION = (
+    "The same demonstrations of a scripted leader arm, encoded in each action space; one Action Chunking Transformer "
+    "trained on each encoding, with the same settings; each policy rolled out from the same initial states, which no "
+    "demonstration had. The two task decoders run the same policy: they differ in what inverse kinematics does with "
+    "the elbow that a task-space action leaves open."
+)
 
 _LOGGED_STEP = re.compile(r"step:([\d.]+)(K?)")  # as lerobot-train logs it
 
@@ -53,13 +60,14 @@ class Demo:
 
     def training(self, space: str) -> Training:
         """The training of a space's policy."""
+        config = default_config(space)
         return Training(
             task=self.task,
             space=space,
             dataset=self.dataset(space),
             out=self.out / "policies" / self.task / space,
-            config=default_config(space),
-            steps=STEPS,
+            config=config,
+            steps=default_steps(config),
             seed=self.seed,
         )
 
@@ -82,13 +90,25 @@ class Demo:
         owner.write_text(json.dumps(mine))
 
     def run(self, progress: Progress, workers: int) -> list[Cell]:
-        """Do all that is not done yet; return a cell a decoder."""
+        """Do all that is not done yet, write the report; return a cell a decoder."""
         self.claim()
         recipe = replace(Recipe.load(self.task), seed=self.seed)
         generate(recipe, self.spaces, self.out / "datasets" / self.task, progress, workers)
         with worker_pool(workers, _one_thread) as pool:
             _Schedule(self, pool, progress).run()
-        return [self._cell(name) for name in self.decoders]
+            cells = [self._cell(name) for name in self.decoders]
+            policies = {name: self.training(decoder(name).space).policy for name in self.decoders}
+            pictures = film_rollouts(pool, progress, policies, self.task, telling_seed(cells), self.out)
+        meta = {
+            "demonstrations": recipe.episodes,
+            "trained_on": recipe.episodes - recipe.validation,
+            "demonstration_and_training_seed": self.seed,
+            "training_steps": self.training(self.spaces[0]).steps,
+            "rollouts": EPISODES,
+            "rollout_seeds": f"{FIRST_SEED} to {FIRST_SEED + EPISODES - 1}",
+        }
+        write_report(cells, meta, self.out, INTRODUCTION, pictures)
+        return cells
 
     def chunks(self, name: str) -> list[tuple[Path, int, int]]:
         """The rollouts of a decoder in jobs: where the result goes, the first seed, how many."""

@@ -1,6 +1,5 @@
 """One rollout of a trained policy, recorded in full: a trace, and a film if wanted."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,14 +9,15 @@ from lerobot.envs.utils import NEW_ROLLOUT_OPTION
 
 from er_il.actor import Actor, environment_of
 from er_il.evaluation import TIMEOUT
+from er_il.pictures import Picture
 from er_il.trace import Trace
 
 SUCCESS = "success"
 
 
 def record_rollout(
-    policy: Path, task: str, decoder_name: str, seed: int, film: Callable[[np.ndarray], None] | None = None
-) -> Trace:
+    policy: Path, task: str, decoder_name: str, seed: int, film_every: int = 0
+) -> tuple[Trace, list[Picture]]:
     """Roll a policy out once, exactly as :func:`er_il.evaluation.evaluate` does on that seed.
 
     Args:
@@ -25,12 +25,13 @@ def record_rollout(
         task: Name of the task.
         decoder_name: ``joint``, ``task-nearest``, ``task-posture``, ``erj``, ``era``.
         seed: Seed of the initial state.
-        film: Takes a picture (H, W, 3) uint8 of the scene before each control step and at the end.
+        film_every: Take a picture each so many control steps, and one at the end; 0: none.
     """
     config = environment_of(policy, task, decoder_name)
     actor = Actor.load(policy, config)
     env = config.make()
     world: Any = env.unwrapped
+    pictures: list[Picture] = []
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     rows: dict[str, list[Any]] = {key: [] for key in ("q", "gripper", "action", "command", "status", "state")}
@@ -39,8 +40,8 @@ def record_rollout(
         actor.policy.reset()
         done = False
         while not done:
-            if film:
-                film(world.render())
+            if film_every and len(rows["q"]) % film_every == 0:
+                pictures.append(world.render())
             batch = _batched(observation)
             rows["q"].append(world.joint_positions)
             rows["gripper"].append(world.gripper_opening)
@@ -51,9 +52,9 @@ def record_rollout(
             rows["command"].append(info["command"])
             rows["status"].append(info["decode_status"])
             done = terminated or truncated
-        if film:
-            film(world.render())
-        return Trace(
+        if film_every:
+            pictures.append(world.render())
+        trace = Trace(
             task=task,
             seed=seed,
             period=1 / env.metadata["render_fps"],
@@ -68,6 +69,7 @@ def record_rollout(
             environment_state=np.array(rows["state"], dtype=np.float64),
             environment_state_names=world.environment_state_names,
         )
+        return trace, pictures
     finally:
         env.close()
         torch.set_num_threads(threads)

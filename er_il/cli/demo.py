@@ -15,11 +15,13 @@ def demo(*, out: Path = Path("outputs/demo"), seed: int = 0) -> None:
     from rich.console import Console
 
     from er_il.cli.progress import make_progress
+    from er_il.cli.table import results_table
     from er_il.demo import Demo
+    from er_il.report import PAGE
     from er_il.workers import cores
 
     console = Console()
     with make_progress(console) as progress:
         cells = Demo(out, seed).run(progress, cores())
-    for cell in cells:
-        console.print(cell.report())
+    console.print(results_table([cell.report() for cell in cells]))
+    console.print(f"{out / PAGE}", highlight=False)

@@ -1,0 +1,103 @@
+"""A report of results as a chart and a page, rendered from the JSON alone."""
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+REPORT, CHART, PAGE = "report.json", "success.png", "report.md"
+LABELS = {
+    "joint": "Joint",
+    "erj": "ERJ",
+    "era": "ERA",
+    "task-nearest": "Task\n(nearest)",
+    "task-posture": "Task\n(posture)",
+}
+# Okabe and Ito's palette: told apart by every eye.
+COLOURS = {"joint": "#56B4E9", "erj": "#009E73", "era": "#CC79A7", "task-nearest": "#E69F00", "task-posture": "#D55E00"}
+
+
+def success_table(cells: Sequence[Mapping[str, Any]]) -> str:
+    """Render results as a Markdown table."""
+    rows = [
+        "| Task | Decoder | Success | 95 % interval | Failures | Invalid actions | Decode p50 / p99 | Largest step |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for cell in cells:
+        low, high = cell["interval"]
+        failures = ", ".join(f"{name} {count}" for name, count in cell["failures"].items()) or "–"
+        rows.append(
+            f"| {cell['task']} | {cell['decoder']} | **{cell['successes']}/{cell['episodes']}** "
+            f"| {low:.1%} – {high:.1%} | {failures} | {cell['invalid_rate']:.1%} "
+            f"| {cell['decode_p50_ms']:.2f} / {cell['decode_p99_ms']:.2f} ms | {cell['max_joint_step']:.3f} rad |"
+        )
+    return "\n".join(rows)
+
+
+def write_chart(cells: Sequence[Mapping[str, Any]], path: Path) -> None:
+    """Write a bar chart of success with exact 95 % intervals, one group of bars a task."""
+    tasks = list(dict.fromkeys(cell["task"] for cell in cells))
+    decoders = list(dict.fromkeys(cell["decoder"] for cell in cells))
+    figure = Figure(figsize=(1.6 + 1.15 * len(cells), 3.8), dpi=140, layout="constrained")
+    axis = figure.subplots()
+    ticks = []
+    for cell in cells:
+        x = tasks.index(cell["task"]) * (len(decoders) + 0.8) + decoders.index(cell["decoder"])
+        share, (low, high) = cell["successes"] / cell["episodes"], cell["interval"]
+        axis.bar(x, 100 * share, width=0.72, color=COLOURS.get(cell["decoder"], "#999999"), zorder=2)
+        spread = 100 * np.array([[share - low], [high - share]])
+        axis.errorbar(x, 100 * share, yerr=spread, color="#222222", capsize=5, linewidth=1.3, zorder=3)
+        axis.text(x, 106, f"{cell['successes']}/{cell['episodes']}", ha="center", fontsize=9, color="#222222")
+        ticks.append((x, LABELS.get(cell["decoder"], cell["decoder"])))
+    axis.set_xticks([x for x, _ in ticks], [label for _, label in ticks], fontsize=9)
+    axis.set_ylim(0, 114)
+    axis.set_yticks(range(0, 101, 25))
+    axis.set_ylabel("Successful rollouts [%]")
+    axis.grid(axis="y", color="#dddddd", zorder=0)
+    axis.spines[["top", "right"]].set_visible(False)
+    axis.set_title(", ".join(tasks) + "   (bars: exact 95 % intervals)", fontsize=10, loc="left")
+    figure.savefig(path)
+
+
+def write_page(folder: Path, title: str, introduction: str, pictures: Mapping[str, str]) -> None:
+    """Write ``report.md`` from ``report.json`` in a folder, with the chart and named pictures.
+
+    Args:
+        folder: Where ``report.json`` is and the page goes.
+        title: Heading of the page.
+        introduction: What was done, in a paragraph.
+        pictures: Caption to file name, relative to the folder; films become links.
+    """
+    report = json.loads((folder / REPORT).read_text())
+    cells, meta = report["cells"], report["meta"]
+    write_chart(cells, folder / CHART)
+    shown = [
+        f"![{caption}]({name})\n\n*{caption}*" if name.endswith(".png") else f"- [{caption}]({name})"
+        for caption, name in pictures.items()
+    ]
+    versions = ", ".join(f"{name} {version}" for name, version in meta["versions"].items())
+    settings = [
+        f"- {key.replace('_', ' ')}: {value}"
+        for key, value in meta.items()
+        if key not in ("git", "versions", "machine")
+    ]
+    page = [
+        f"# {title}",
+        introduction,
+        success_table(cells),
+        f"![Success of each decoder]({CHART})",
+        *shown,
+        "## How it was made",
+        "\n".join(
+            [
+                f"- code: {meta['git'] or 'no checkout'}",
+                f"- versions: {versions}",
+                f"- machine: {meta['machine']['processor']}, {meta['machine']['cores']} cores",
+                *settings,
+            ]
+        ),
+    ]
+    (folder / PAGE).write_text("\n\n".join(page) + "\n")
