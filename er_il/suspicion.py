@@ -150,8 +150,9 @@ def _best_order(sample: Evidence, q: Array) -> list[int] | None:
     excess = np.maximum(arm.lower - q[:, :, None], q[:, :, None] - arm.upper)  # (N, value, joint)
     outside = (excess > BEYOND).mean(axis=0)
     if sample.positions is None or math.factorial(n) > MAX_ORDERS:
+        # As few joints as possible elsewhere; among those, near the middle of their ranges.
         middle = np.abs(q.mean(axis=0)[:, None] - (arm.lower + arm.upper) / 2) / (arm.upper - arm.lower)
-        order = linear_sum_assignment((outside + 1e-3 * middle).T)[1].tolist()
+        order = linear_sum_assignment((outside + 1e-2 * (1 - np.eye(n)) + 1e-4 * middle).T)[1].tolist()
     else:
         few, positions = _few(q), _few(sample.positions)
         possible = outside <= TOLERATED

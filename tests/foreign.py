@@ -67,7 +67,7 @@ def write_bimanual(root: Path, camera: bool = False) -> Path:
         rows = np.stack([values[name] for name in NAMES], axis=1).astype(np.float32)
         for t, row in enumerate(rows):
             frame = {"action": row, "observation.state": rows[max(0, t - 1)], "note": np.array([t]), "task": "fold"}
-            frame["observation.environment_state"] = np.float32([t, -t])
+            frame["observation.environment_state"] = np.array([t, -t], dtype=np.float32)
             if camera:
                 frame["observation.images.top"] = np.full((32, 32, 3), t, dtype=np.uint8)
             dataset.add_frame(frame)
