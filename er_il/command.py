@@ -15,6 +15,7 @@ from er_il.spaces import ActionSpace
 BEST_EFFORT, HOLD, STOP = "best_effort", "hold", "stop"
 ON_INVALID = (BEST_EFFORT, HOLD, STOP)
 
+LEAD_PERIODS = 4  # an arm that is held up is told no further than it gets in these periods; servos need two or so
 JUMP_PERIODS = 5  # a solution this many periods away at full speed is on another branch, not on the way
 
 
@@ -54,6 +55,9 @@ class Commander:
       action that means nothing (``Status.INVALID``) leaves the last command standing.
     - ``hold``: the last command stands.
     - ``stop``: the last command stands until the next reset.
+
+    An arm that is held up, by what it ran into, is waited for: the last command stands until the arm
+    has come near it, or the action leads back.
     """
 
     def __init__(self, space: ActionSpace, period: float, on_invalid: str = BEST_EFFORT) -> None:
@@ -119,9 +123,10 @@ class Commander:
         self._stopped |= self.on_invalid == STOP and status is not Status.OK
         asked = float(np.max(np.abs(target - self._last)))
         follows = status is Status.OK or (self.on_invalid == BEST_EFFORT and status is not Status.INVALID)
-        follows = follows and not self._stopped
+        ahead = self._limited(self._last, target)
+        follows = follows and not self._stopped and not self._runs_away(ahead, q)
         if follows:
-            self._last = self._limited(self._last, target)
+            self._last = ahead
             self._gripper = gripper
         self.tally.statuses[status] += 1
         self.tally.latencies.append(latency)
@@ -139,6 +144,13 @@ class Commander:
         far = np.any(np.abs(decoded.q - measured) > JUMP_PERIODS * self._reach)
         status = Status.JUMP if far and decoded.status is Status.OK else decoded.status
         return decoded.q, decoded.gripper, status
+
+    def _runs_away(self, ahead: Vector, q: ArrayLike) -> bool:
+        """Whether a command would leave behind an arm that does not come along: it waits for it instead."""
+        assert self._last is not None
+        measured = np.asarray(q, dtype=np.float64)
+        lead, before = np.abs(ahead - measured), np.abs(self._last - measured)
+        return bool(np.any((lead > LEAD_PERIODS * self._reach) & (lead > before)))
 
     def _limited(self, last: Vector, target: Vector) -> Vector:
         """Go towards the target as far as the slowest joint may; all joints together, on a straight line."""

@@ -32,7 +32,8 @@ class RobotCommander:
     belongs to no arm (grippers, say) goes through as it is, as long as every arm follows.
 
     Episodes begin with :meth:`reset`. LeRobot's recording never resets its processors, and a person
-    may take over in between: an arm that is elsewhere than commanded goes on from where it is.
+    may take over in between: an arm that is elsewhere than commanded goes on from where it is. So a
+    command is within one period's way of the last one, or else of the measured joints.
     """
 
     def __init__(self, layout: Layout, period: float, on_invalid: str = BEST_EFFORT) -> None:
@@ -88,7 +89,7 @@ class RobotCommander:
                 commander.anchor(q)
                 strayed = True
         if strayed and not self._strayed:
-            logger.warning("The arm is elsewhere than commanded, moved or held up; commands go on from where it is.")
+            logger.warning("The arm was moved by something else; its commands go on from where it is.")
         self._started, self._strayed = True, strayed
         arms = tuple(c.command(each, q) for c, each, q in zip(self._commanders, own, angles, strict=True))
         if any(arm.stopped for arm in arms):

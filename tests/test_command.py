@@ -121,3 +121,24 @@ def test_mistakes_name_the_choices():
         Commander(space, 0.0)
     with pytest.raises(ErIlError, match="not finite"):
         Commander(space, PERIOD).reset(np.full(7, np.nan))
+
+
+def test_a_delta_counts_from_the_last_command_not_from_where_the_arm_sags_to():
+    delta = commander("delta_joint")
+    change = 0.1 * REACH
+    for step in (1, 2):
+        command = delta.command(np.append(change, 1.0), PANDA.home - 0.01)
+        np.testing.assert_allclose(command.q, PANDA.home + step * change, atol=1e-9)
+
+
+def test_an_arm_that_is_held_up_is_waited_for_and_can_turn_back():
+    joint = commander()
+    held = PANDA.home + 0.1 * REACH
+    goal = joint.space.encode(PANDA.home + 5 * REACH)
+    commands = [joint.command(goal, held) for _ in range(8)]
+    assert [command.followed for command in commands] == [True] * 4 + [False] * 4
+    np.testing.assert_allclose(commands[-1].q, PANDA.home + 4 * REACH)
+    assert not joint.strayed(held)
+    back = joint.command(joint.space.encode(PANDA.home), held)
+    np.testing.assert_allclose(back.q, PANDA.home + 3 * REACH)
+    assert joint.strayed(PANDA.home - 3 * REACH)

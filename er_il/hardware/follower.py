@@ -11,7 +11,7 @@ from lerobot.robots import Robot, RobotConfig
 from lerobot.utils.decorators import check_if_already_connected, check_if_not_connected
 
 from er_il.hardware.episodes import EpisodeAnnouncements
-from er_il.hardware.joints import DEGREES, POSITION, JointNames
+from er_il.hardware.joints import POSITION, JointNames
 from er_il.tasks import task_id
 
 logger = logging.getLogger(__name__)
@@ -37,7 +37,7 @@ class SimFollowerConfig(RobotConfig):
     seed: int = 0
     camera_names: list[str] = field(default_factory=lambda: ["wrist"])
     image_size: int = 96
-    units: str = DEGREES
+    units: str = "deg"
     pose: bool = False
 
 

@@ -6,12 +6,11 @@ from typing import Any
 import numpy as np
 
 from er_il.arm import Vector
-from er_il.errors import ErIlError, UnknownNameError
+from er_il.errors import ErIlError
+from er_il.motors import Motors
 
 POSITION = ".pos"  # lerobot-rollout passes on nothing but positions (.pos) and velocities (.vel)
 GRIPPER = "gripper"
-DEGREES, RADIANS = "deg", "rad"
-UNITS = {DEGREES: np.pi / 180, RADIANS: 1.0}  # [rad] of one
 
 
 class JointNames:
@@ -23,14 +22,13 @@ class JointNames:
         Raises:
             UnknownNameError: the units are neither ``deg`` nor ``rad``.
         """
-        if units not in UNITS:
-            raise UnknownNameError("unit", units, UNITS)
-        self.names = (*(f"{joint}{POSITION}" for joint in joints), f"{GRIPPER}{POSITION}")
-        self._scale = np.append(np.full(len(joints), UNITS[units]), 1.0)
+        self._motors = Motors(tuple(f"{joint}{POSITION}" for joint in joints), units)
+        self.names = (*self._motors.joints, f"{GRIPPER}{POSITION}")
 
     def to_robot(self, values: Vector) -> dict[str, float]:
         """Name (n + 1,) angles [rad] and opening, in the robot's units."""
-        return dict(zip(self.names, (values / self._scale).tolist(), strict=True))
+        spoken = [*self._motors.values(values[:-1]).tolist(), float(values[-1])]
+        return dict(zip(self.names, spoken, strict=True))
 
     def from_robot(self, named: Mapping[str, Any]) -> Vector:
         """Return (n + 1,) angles [rad] and opening. Other names are ignored.
@@ -46,4 +44,5 @@ class JointNames:
                 f"The action lacks {', '.join(missing)}; it has {', '.join(named)}. The simulated robot takes "
                 f"{', '.join(self.names)}; an ERJ, ERA or task action must be decoded before (er-il attach)."
             )
-        return np.array([float(values[name]) for name in wanted]) * self._scale
+        spoken = np.array([float(values[name]) for name in wanted])
+        return np.append(self._motors.angles(spoken[:-1]), spoken[-1])

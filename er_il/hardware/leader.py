@@ -12,7 +12,7 @@ from lerobot.utils.decorators import check_if_already_connected, check_if_not_co
 
 from er_il.arm import Vector
 from er_il.hardware.episodes import EpisodeAnnouncements
-from er_il.hardware.joints import DEGREES, JointNames
+from er_il.hardware.joints import JointNames
 from er_il.tasks import task_id
 
 
@@ -31,7 +31,7 @@ class ScriptedLeaderConfig(TeleoperatorConfig):
     task: str = "reach_cup"
     arm: str = "panda"
     seed: int = 0
-    units: str = DEGREES
+    units: str = "deg"
 
 
 class ScriptedLeader(Teleoperator):

@@ -1,0 +1,235 @@
+"""The stock commands for robots, on the simulated follower and the scripted leader."""
+
+import json
+import logging
+import sys
+from collections.abc import Generator
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+import torch
+from lerobot.datasets import LeRobotDataset
+from lerobot.policies.act.modeling_act import ACTPolicy
+from lerobot.robots import RobotConfig, make_robot_from_config
+from lerobot.scripts import lerobot_record, lerobot_replay, lerobot_rollout, lerobot_teleoperate, lerobot_train
+from lerobot.teleoperators import TeleoperatorConfig, make_teleoperator_from_config
+from lerobot.utils.import_utils import register_third_party_plugins
+
+from er_il import cli
+from er_il.contract import check_policy
+from er_il.errors import ErIlError, PolicyError, UnknownNameError
+from er_il.hardware import ScriptedLeader, ScriptedLeaderConfig, SimFollower, SimFollowerConfig
+from er_il.layout import Layout
+from er_il.lerobot_env import ErIlEnvConfig
+from er_il.schema import ACTION
+from er_il.tasks import task_id
+
+SEED = 7
+SIZE = 32
+ROBOT = ["--robot.type=er_il_sim", f"--robot.seed={SEED}", f"--robot.image_size={SIZE}"]
+LEADER = ["--teleop.type=er_il_scripted_leader", f"--teleop.seed={SEED}"]
+RATE = 60  # [Hz] the simulated world takes its own time, 20 Hz: here three times as fast as life
+NAMES = [*(f"panda_joint{i}.pos" for i in range(1, 8)), "gripper.pos"]
+TINY = ["dim_model=32", "dim_feedforward=32", "n_heads=2", "n_encoder_layers=1", "use_vae=false"]
+
+
+@pytest.fixture(autouse=True)
+def quiet_logging() -> Generator[None]:
+    """Undo what the stock commands do to the root logger, which pytest listens on."""
+    root = logging.getLogger()
+    handlers, level = list(root.handlers), root.level
+    yield
+    root.handlers[:] = handlers
+    root.setLevel(level)
+
+
+def run(main: object, *arguments: str) -> None:
+    """Run a command in this process."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["command", *arguments])
+        main()  # pyright: ignore[reportCallIssue]
+
+
+def script(seed: int) -> np.ndarray:
+    """The demonstration (T, 8) [rad] of a seed's world."""
+    env = gymnasium.make(task_id("reach_cup"))
+    env.reset(seed=seed)
+    world = env.unwrapped
+    return np.array(list(world.leader(seed)))  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def in_degrees(script: np.ndarray) -> np.ndarray:
+    return np.column_stack([np.degrees(script[:, :-1]), script[:, -1]])
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("recorded") / "data"
+    dataset = ["--dataset.repo_id=me/reach", f"--dataset.root={root}", "--dataset.single_task=Reach the cup."]
+    dataset += [f"--dataset.fps={RATE}", "--dataset.num_episodes=2", "--dataset.episode_time_s=2"]
+    dataset += ["--dataset.reset_time_s=0.1", "--dataset.push_to_hub=false", "--play_sounds=false"]
+    run(lerobot_record.main, *ROBOT, *LEADER, *dataset)
+    return root
+
+
+@pytest.fixture(scope="module")
+def policy(recorded: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An ERJ policy, trained for two steps on what was recorded."""
+    folder = tmp_path_factory.mktemp("policy")
+    encode = ["encode", str(recorded), "--to", "erj", "--arm", "panda", "--units", "deg"]
+    run(cli.main, *encode, "--out", str(folder / "erj"))
+    train = ["--policy.type=act", "--policy.device=cpu", "--policy.push_to_hub=false", "--num_workers=0"]
+    train += ["--policy.pretrained_backbone_weights=null", *(f"--policy.{option}" for option in TINY)]
+    train += ["--policy.chunk_size=4", "--policy.n_action_steps=1", "--policy.temporal_ensemble_coeff=0.01"]
+    train += ["--policy.normalization_mapping={VISUAL: MEAN_STD, STATE: MIN_MAX, ACTION: IDENTITY}"]
+    train += ["--dataset.repo_id=me/reach_erj", f"--dataset.root={folder / 'erj'}", "--dataset.video_backend=pyav"]
+    run(lerobot_train.main, *train, f"--output_dir={folder / 'out'}", "--steps=2", "--batch_size=2")
+    return folder / "out"
+
+
+@pytest.fixture(scope="module")
+def attached(policy: Path) -> Path:
+    out = policy.with_name("attached")
+    run(cli.main, "attach", str(policy), "--out", str(out), "--fps", "20")
+    return out
+
+
+@pytest.mark.slow
+def test_stock_record_gives_a_dataset_of_the_scripts_in_degrees(recorded: Path):
+    dataset = LeRobotDataset("me/reach", root=recorded, video_backend="pyav")
+    assert dataset.num_episodes == 2
+    assert dataset.features[ACTION]["names"] == dataset.features["observation.state"]["names"] == NAMES
+    assert dataset.features["observation.images.wrist"]["shape"] == (SIZE, SIZE, 3)
+    columns = dataset.hf_dataset.with_format("numpy")
+    for episode in range(2):
+        rows = columns[:]["episode_index"] == episode
+        action, state = columns[:][ACTION][rows], columns[:]["observation.state"][rows]
+        expected = in_degrees(script(SEED + episode))  # another world each episode, from its beginning
+        steps = min(len(action), len(expected))
+        assert steps > 40
+        np.testing.assert_allclose(action[:steps], expected[:steps], atol=1e-4)
+        np.testing.assert_allclose(state[1:steps, :7], action[: steps - 1, :7], atol=3.0)  # servos lag
+    assert dataset[0]["observation.images.wrist"].std() > 0.01
+
+
+@pytest.mark.slow
+def test_an_erj_policy_drives_the_robot_to_the_cup_through_the_stock_rollout(
+    attached: Path, recorded: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+):
+    """The network says what the demonstration says; all that follows on it is the real thing."""
+    encoded = LeRobotDataset("me/reach_erj", root=attached.with_name("erj"), video_backend="pyav")
+    spec = encoded.features[ACTION]["info"]["er_il"]
+    actions = Layout.from_spec(spec).encode(in_degrees(script(SEED)))
+    said = iter(torch.from_numpy(actions.astype(np.float32)))
+    last = torch.from_numpy(actions[-1:].astype(np.float32))
+    monkeypatch.setattr(ACTPolicy, "select_action", lambda self, batch: next(said, last[0])[None])
+    run(lerobot_rollout.main, f"--policy.path={attached}", *ROBOT, "--fps=100", "--duration=4", "--task=Reach the cup.",
+        "--return_to_initial_position=false")  # fmt: skip
+    assert "Simulated episode 0: success" in capfd.readouterr().err
+
+
+@pytest.mark.slow
+def test_stock_rollout_records_episodes_of_the_trained_policy_in_joint_positions(attached: Path, tmp_path: Path):
+    dataset = ["--dataset.repo_id=me/rollout_reach", f"--dataset.root={tmp_path / 'rollout'}", "--dataset.fps=60"]
+    dataset += ["--dataset.num_episodes=2", "--dataset.episode_time_s=1", "--dataset.reset_time_s=0"]
+    dataset += ["--dataset.single_task=Reach the cup.", "--dataset.push_to_hub=false", "--play_sounds=false"]
+    run(lerobot_rollout.main, f"--policy.path={attached}", *ROBOT, "--strategy.type=episodic", f"--fps={RATE}",
+        "--strategy.reset_to_initial_position=false", "--return_to_initial_position=false", *dataset)  # fmt: skip
+    (root,) = tmp_path.iterdir()
+    rollout = LeRobotDataset("me/rollout_reach", root=root, video_backend="pyav")
+    assert rollout.num_episodes == 2
+    assert rollout.features[ACTION]["names"] == NAMES
+    columns = rollout.hf_dataset.with_format("numpy")[:]
+    arm = SimFollower(SimFollowerConfig(camera_names=[]))._env.unwrapped.arm  # pyright: ignore[reportAttributeAccessIssue]
+    for episode in range(2):
+        rows = columns["episode_index"] == episode
+        q, measured = np.radians(columns[ACTION][rows][:, :7]), np.radians(columns["observation.state"][rows][:, :7])
+        reach = arm.velocity / 20 + 1e-5
+        # Untrained, it runs into things: an arm that was flung away goes on from where it is measured.
+        follows = np.all(np.abs(np.diff(q, axis=0)) <= reach, axis=1)
+        restarts = np.all(np.abs(q - measured) <= reach, axis=1)
+        assert restarts[0]
+        assert np.all(follows | restarts[1:])
+        assert np.all(q >= arm.lower - 1e-6) and np.all(q <= arm.upper + 1e-6)
+
+
+@pytest.mark.slow
+def test_an_attached_policy_is_refused_where_the_environment_decodes(policy: Path, attached: Path):
+    steps = json.loads((attached / "policy_preprocessor.json").read_text())["steps"]
+    assert [step["registry_name"] for step in steps][:2] == [
+        "rename_observations_processor",
+        "relative_actions_processor",
+    ]
+    env = ErIlEnvConfig(action_space="erj").make()
+    with pytest.raises(PolicyError, match="decodes its actions by itself"):
+        check_policy(attached, env.space)
+    with pytest.raises(SystemExit):
+        run(cli.main, "attach", str(attached), "--out", str(attached) + "2")
+    with pytest.raises(SystemExit):
+        run(cli.main, "attach", str(policy), "--out", str(attached))
+
+
+@pytest.mark.slow
+def test_stock_replay_and_teleoperate(recorded: Path, capfd: pytest.CaptureFixture[str]):
+    replayed = ["--dataset.repo_id=me/reach", f"--dataset.root={recorded}", "--dataset.episode=0"]
+    run(lerobot_replay.main, *ROBOT, *replayed, "--play_sounds=false")
+    run(lerobot_teleoperate.main, *ROBOT, *LEADER, "--fps=200", "--teleop_time_s=3")
+    assert "Simulated episode 0: success" in capfd.readouterr().err
+
+
+def test_one_plugin_registers_robot_and_teleoperator():
+    register_third_party_plugins()
+    assert RobotConfig.get_choice_class("er_il_sim") is SimFollowerConfig
+    assert TeleoperatorConfig.get_choice_class("er_il_scripted_leader") is ScriptedLeaderConfig
+    assert isinstance(make_robot_from_config(SimFollowerConfig(camera_names=[])), SimFollower)
+    assert isinstance(make_teleoperator_from_config(ScriptedLeaderConfig()), ScriptedLeader)
+
+
+def test_the_world_starts_over_when_lerobot_announces_an_episode():
+    follower, leader = (
+        SimFollower(SimFollowerConfig(seed=3, camera_names=[])),
+        ScriptedLeader(ScriptedLeaderConfig(seed=3)),
+    )
+    logging.getLogger().setLevel(logging.INFO)
+    follower.connect()
+    leader.connect()
+    first = follower.get_observation()
+    logging.info("Recording episode 0")
+    assert follower.get_observation() == first
+    for _ in range(5):
+        follower.send_action(leader.get_action())
+    assert follower.get_observation() != first
+    logging.info("Recording episode 1")
+    second = follower.get_observation()
+    other = SimFollower(SimFollowerConfig(seed=4, camera_names=[]))
+    other.connect()
+    assert second == other.get_observation()
+    np.testing.assert_allclose(list(leader.get_action().values()), in_degrees(script(4))[0])
+    for device in (follower, leader, other):
+        device.disconnect()
+        assert not device.is_connected
+
+
+def test_the_robot_speaks_the_units_and_observes_the_pose_that_it_is_asked_for():
+    robot = SimFollower(SimFollowerConfig(camera_names=[], units="rad", pose=True))
+    robot.connect()
+    seen = robot.get_observation()
+    assert list(seen) == list(robot.observation_features)
+    env = gymnasium.make(task_id("reach_cup"))
+    np.testing.assert_allclose(list(seen.values()), env.reset(seed=0)[0]["agent_pos"])
+    sent = robot.send_action(dict.fromkeys(robot.action_features, 99.0))
+    assert sent["panda_joint1.pos"] == pytest.approx(2.8973)  # the URDF's limit
+    robot.disconnect()
+
+
+def test_mistakes():
+    with pytest.raises(UnknownNameError, match="lift_cup, reach_cup"):
+        SimFollower(SimFollowerConfig(task="reach_cap"))
+    with pytest.raises(UnknownNameError, match="rad, deg"):
+        ScriptedLeader(ScriptedLeaderConfig(units="turns"))
+    robot = SimFollower(SimFollowerConfig(camera_names=[]))
+    robot.connect()
+    with pytest.raises(ErIlError, match="er-il attach"):
+        robot.send_action({"ee.x": 0.5, "gripper": 1.0})
