@@ -28,7 +28,7 @@ Features = dict[PipelineFeatureType, dict[str, PolicyFeature]]
 DECODE_ROBOT_ACTION = "er_il_decode_robot_action"
 
 
-@dataclass
+@dataclass(kw_only=True)
 class _Decoding:
     """What both steps are told.
 
@@ -69,7 +69,7 @@ def measured_names(layout: Layout) -> dict[str, str]:
 
 
 @ProcessorStepRegistry.register(DECODE_ROBOT_ACTION)
-@dataclass
+@dataclass(kw_only=True)
 class DecodeRobotAction(_Decoding, RobotActionProcessorStep):
     """Decodes named actions to the robot's named joint positions, in its units.
 
@@ -100,7 +100,7 @@ def _measured(observation: dict[str, Any], name: str) -> float:
 
 
 @ProcessorStepRegistry.register(DECODE_POLICY_ACTION)
-@dataclass
+@dataclass(kw_only=True)
 class DecodePolicyAction(_Decoding, AbsoluteActionsProcessorStep):
     """Decodes a policy's actions to a robot's joint vectors, in its units: a post-processor's last step.
 
@@ -108,9 +108,7 @@ class DecodePolicyAction(_Decoding, AbsoluteActionsProcessorStep):
         state_names: Names of ``observation.state``, as the policy was trained.
     """
 
-    spec: dict[str, Any] = field(default_factory=dict)
-    period: float = 0.0
-    state_names: list[str] = field(default_factory=list)
+    state_names: list[str]
 
     def __post_init__(self) -> None:
         super().__post_init__()
