@@ -9,7 +9,7 @@ import os
 import re
 import subprocess
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from rich.progress import Progress, TaskID
@@ -22,12 +22,13 @@ from er_il.recipe import Recipe
 from er_il.recording import generate
 from er_il.results import load_cell, save_cell
 from er_il.showing import film_rollouts, telling_seed, write_report
+from er_il.tasks import task_id
 from er_il.training import Training, default_config, default_steps, executable
 from er_il.workers import worker_pool
 
 TASK = "reach_cup"
 DECODERS = ("joint", "erj", "task-nearest", "task-posture")
-EPISODES = 50  # rollouts a decoder
+ROLLOUTS = 50
 POLL = 0.5  # [s] between looks at the trainings' logs
 
 INTRODUCTION = (
@@ -45,9 +46,19 @@ class Demo:
     """One run of the demo, in a folder that belongs to one seed and one set of decoders."""
 
     out: Path
-    seed: int
+    seed: int = 0
     task: str = TASK
     decoders: tuple[str, ...] = DECODERS
+    rollouts: int = ROLLOUTS  # a decoder
+    demonstrations: int | None = None  # as many as the recipe says if None
+    steps: int | None = None  # of training a policy; as many as the configuration says if None
+
+    def __post_init__(self) -> None:
+        task_id(self.task)
+        for name in self.decoders:
+            decoder(name)  # raises if unknown
+        if self.rollouts < 1:
+            raise ErIlError(f"{self.rollouts} rollouts say nothing; ask for at least one.")
 
     @property
     def spaces(self) -> tuple[str, ...]:
@@ -67,7 +78,7 @@ class Demo:
             dataset=self.dataset(space),
             out=self.out / "policies" / self.task / space,
             config=config,
-            steps=default_steps(config),
+            steps=self.steps or default_steps(config),
             seed=self.seed,
         )
 
@@ -78,11 +89,12 @@ class Demo:
             ErIlError: it holds another run's results.
         """
         owner = self.out / "demo.json"
-        mine = {"task": self.task, "seed": self.seed, "decoders": list(self.decoders)}
+        mine = {key: value for key, value in asdict(self).items() if key != "out"}
         if owner.exists():
             found = json.loads(owner.read_text())
-            if found != mine:
-                raise ErIlError(f"{self.out} holds the demo {found}, not {mine}; choose another --out, or delete it.")
+            if different := [key for key, value in mine.items() if found.get(key) != json.loads(json.dumps(value))]:
+                difference = ", ".join(f"{key} {found.get(key)!r}, not {mine[key]!r}" for key in different)
+                raise ErIlError(f"{self.out} holds a demo with {difference}; choose another --out, or delete it.")
             return
         if self.out.exists() and any(self.out.iterdir()):
             raise ErIlError(f"{self.out} holds something else than a demo; choose another --out.")
@@ -93,6 +105,8 @@ class Demo:
         """Do all that is not done yet, write the report; return a cell a decoder."""
         self.claim()
         recipe = replace(Recipe.load(self.task), seed=self.seed)
+        if self.demonstrations is not None:
+            recipe = recipe.resized(self.demonstrations)
         generate(recipe, self.spaces, self.out / "datasets" / self.task, progress, workers)
         with worker_pool(workers, _one_thread) as pool:
             _Schedule(self, pool, progress).run()
@@ -104,8 +118,8 @@ class Demo:
             "trained_on": recipe.episodes - recipe.validation,
             "demonstration_and_training_seed": self.seed,
             "training_steps": self.training(self.spaces[0]).steps,
-            "rollouts": EPISODES,
-            "rollout_seeds": f"{FIRST_SEED} to {FIRST_SEED + EPISODES - 1}",
+            "rollouts": self.rollouts,
+            "rollout_seeds": f"{FIRST_SEED} to {FIRST_SEED + self.rollouts - 1}",
         }
         write_report(cells, meta, self.out, INTRODUCTION, pictures)
         return cells
@@ -114,8 +128,8 @@ class Demo:
         """The rollouts of a decoder in jobs: where the result goes, the first seed, how many."""
         folder = self.out / "rollouts"
         return [
-            (folder / f"{name}-{start}.json", FIRST_SEED + start, min(POLICY_ROWS, EPISODES - start))
-            for start in range(0, EPISODES, POLICY_ROWS)
+            (folder / f"{name}-{start}.json", FIRST_SEED + start, min(POLICY_ROWS, self.rollouts - start))
+            for start in range(0, self.rollouts, POLICY_ROWS)
         ]
 
     def _cell(self, name: str) -> Cell:
@@ -130,7 +144,7 @@ class _Schedule:
         self._demo, self._pool, self._progress = demo, pool, progress
         self._trainings: dict[Future[None], tuple[Training, TaskID]] = {}
         self._rollouts: dict[Future[None], tuple[TaskID, int]] = {}
-        self._bars = {name: progress.add_task(f"Roll out {name}", total=EPISODES) for name in demo.decoders}
+        self._bars = {name: progress.add_task(f"Roll out {name}", total=demo.rollouts) for name in demo.decoders}
 
     def run(self) -> None:
         for space in self._demo.spaces:

@@ -3,25 +3,35 @@
 from pathlib import Path
 
 
-def demo(*, out: Path = Path("outputs/demo"), seed: int = 0) -> None:
-    """Demonstrate Reach Cup, train a policy in joint, task and ERJ space, roll them out and compare.
+def demo(
+    *,
+    out: Path | None = None,
+    seed: int = 0,
+    task: str = "reach_cup",
+    decoders: str = "joint,erj,task-nearest,task-posture",
+) -> None:
+    """Demonstrate a task, train a policy in each action space, roll them out and compare.
 
     Interrupted, the same command resumes.
 
     Args:
-        out: Folder of everything that it makes.
+        out: Folder of everything that it makes; outputs/demo if omitted (outputs/<task> for another task).
         seed: Seed of the demonstrations and the trainings.
+        task: Task, such as reach_cup or lift_cup.
+        decoders: Decoders to compare, separated by commas: joint, erj, era, task-nearest, task-posture.
     """
     from rich.console import Console
 
     from er_il.cli.progress import make_progress
     from er_il.cli.table import results_table
-    from er_il.demo import Demo
+    from er_il.demo import TASK, Demo
     from er_il.report import PAGE
     from er_il.workers import cores
 
+    folder = out or Path("outputs") / ("demo" if task == TASK else task)
+    run = Demo(folder, seed, task, tuple(decoders.split(",")))
     console = Console()
     with make_progress(console) as progress:
-        cells = Demo(out, seed).run(progress, cores())
+        cells = run.run(progress, cores())
     console.print(results_table([cell.report() for cell in cells]))
-    console.print(f"{out / PAGE}", highlight=False)
+    console.print(f"{folder / PAGE}", highlight=False)
