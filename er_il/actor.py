@@ -81,6 +81,11 @@ class Actor:
         )
         return cls(policy, preprocess, postprocess)
 
+    def reset(self, seed: int) -> None:
+        """Begin episodes. Some policies, such as Diffusion, draw random numbers: from ``seed`` on, the same ones."""
+        torch.manual_seed(seed)
+        self.policy.reset()
+
     def act(self, observation: dict[str, Any], task: str) -> np.ndarray:
         """Return an action (N, dim) a row of the observation, N up to ``POLICY_ROWS``."""
         batch: dict[str, Any] = {key: _filled(rows) for key, rows in preprocess_observation(observation).items()}

@@ -101,7 +101,8 @@ def evaluate(
         episodes: Number of rollouts.
         seed: Seed of the first one; the same seed is the same initial state for every decoder.
         on_invalid: See :class:`er_il.command.Commander`.
-        batch_size: Environments side by side, up to ``POLICY_ROWS``; it changes no result.
+        batch_size: Environments side by side, up to ``POLICY_ROWS``; it changes no result, unless the policy
+            draws random numbers, as Diffusion does.
         advance: Called with the number of episodes just finished.
 
     Raises:
@@ -137,7 +138,7 @@ def _rollout(vector: SyncVectorEnv, actor: Actor, seeds: list[int]) -> list[Epis
     # An environment without a seed of its own repeats the last: its outcome is dropped.
     all_seeds: list[int | None] = [*seeds, *seeds[-1:] * (n - len(seeds))]
     observation, _ = vector.reset(seed=all_seeds, options={NEW_ROLLOUT_OPTION: True})
-    actor.policy.reset()
+    actor.reset(seeds[0])
     description = vector.get_attr("task_description")[0]
     done = np.zeros(n, dtype=bool)
     success, failure = np.zeros(n, dtype=bool), [""] * n

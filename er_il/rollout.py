@@ -37,7 +37,7 @@ def record_rollout(
     rows: dict[str, list[Any]] = {key: [] for key in ("q", "gripper", "action", "command", "status", "state")}
     try:
         observation, info = env.reset(seed=seed, options={NEW_ROLLOUT_OPTION: True})
-        actor.policy.reset()
+        actor.reset(seed)
         done = False
         while not done:
             if film_every and len(rows["q"]) % film_every == 0:
