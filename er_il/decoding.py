@@ -22,6 +22,7 @@ FEW_FRAMES = 4000  # fewer are decoded sooner than worker processes start
 class Episode:
     """T encoded vectors, and what is known about the joints meanwhile."""
 
+    number: int
     actions: Array  # (T, layout's encoded dimensions)
     state: Array | None = None  # (T, D) measured joint vectors; NaN where nothing was measured
     truth: Array | None = None  # (T, D) the joint vectors that were encoded

@@ -145,13 +145,18 @@ def joints_column(features: dict[str, Feature], layout: Layout) -> str | None:
 
 def read_episodes(dataset: Path, info: DatasetInfo, layout: Layout, truth: str | None = None) -> list[Episode]:
     """Read the actions, the measured joints, and the column ``truth`` of joint vectors, if any."""
-    frames = episode_slices(read_episode_numbers(dataset))
+    numbers = read_episode_numbers(dataset)
     actions = read_vectors(dataset, ACTION).astype(np.float64)
     state = _measured(dataset, info, layout)
     vectors = None if truth is None else read_vectors(dataset, truth).astype(np.float64)
     return [
-        Episode(actions[rows], *(None if array is None else array[rows] for array in (state, vectors)))
-        for rows in frames
+        Episode(
+            int(numbers[rows.start]),
+            actions[rows],
+            state=None if state is None else state[rows],
+            truth=None if vectors is None else vectors[rows],
+        )
+        for rows in episode_slices(numbers)
     ]
 
 

@@ -1,6 +1,8 @@
 """Re-encoding as a user asks for it: any LeRobot dataset by name, with or without a specification."""
 
+from collections import Counter
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +16,14 @@ from er_il.spaces import JointSpace
 from er_il.wiring import Wiring, wire
 
 
+@dataclass(frozen=True)
+class Reencoded:
+    """A dataset that was written."""
+
+    layout: Layout  # of its actions
+    statuses: Counter[str]  # decoded commands by er_il.Status; empty if nothing had to be decoded
+
+
 def reencode(
     source: str,
     target: Path,
@@ -23,7 +33,7 @@ def reencode(
     wirings: Sequence[Wiring],
     keep: bool,
     on_progress: Callable[[int, int], object],
-) -> Layout:
+) -> Reencoded:
     """Write a dataset again with its actions in another action space.
 
     Where the source is encoded, joint space is reached through the decoder, and other spaces from
@@ -37,9 +47,6 @@ def reencode(
         wirings: The arms of a dataset that does not know them.
         keep: Keep the joint vectors beside the encoded actions.
         on_progress: Called with the number of frames done, and their total.
-
-    Returns:
-        How the target's actions are encoded.
 
     Raises:
         ErIlError: the dataset, the arms or the space do not fit.
@@ -70,8 +77,10 @@ def reencode(
         options: dict[str, Any] = {"to": kind, "rotation": rotation, "decoded": decode}
         card.sign(partial, written, dataset_layout(written.features), source, options)
 
+    statuses: Counter[str] = Counter()
     if decode:
-        decode_dataset(folder, target, layout, finish=finish, advance=advance)
+        decoded = decode_dataset(folder, target, layout, finish=finish, advance=advance)
+        statuses.update(status for episode in decoded for status in episode.status.ravel().tolist())
     else:
         encode_dataset(folder, target, layout, keep=keep, fit=True, finish=finish, advance=advance)
-    return dataset_layout(dataset_info(target).features)
+    return Reencoded(dataset_layout(dataset_info(target).features), statuses)

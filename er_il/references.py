@@ -30,7 +30,10 @@ def fitted(space: ActionSpace, q: ArrayLike) -> ActionSpace:
     and can be merged.
     """
     postures = np.asarray(q, dtype=np.float64)
+    postures = postures[np.all(np.isfinite(postures), axis=1)]
     postures = postures[:: 1 + len(postures) // SAMPLES]
+    if not len(postures):
+        return space
     if isinstance(space, PoseSpace) and isinstance(space.rotation, Quaternion):
         quaternions = Rotation.from_matrix(space.kinematics.fk_batch(postures)[:, :3, :3]).as_quat()
         space = replace(space, rotation=Quaternion(_hemisphere(quaternions, space.rotation.reference)))

@@ -41,8 +41,9 @@ class Evidence:
     positions: Array | None  # (N, 3) [m] in any fixed frame
 
     def sampled(self) -> "Evidence":
-        """The same with few frames, spread evenly."""
-        rows = np.unique(np.linspace(0, len(self.values) - 1, SAMPLES).astype(int))
+        """The same with few frames, spread evenly over those that hold numbers."""
+        finite = np.flatnonzero(np.all(np.isfinite(self.values), axis=1))
+        rows = finite[np.unique(np.linspace(0, len(finite) - 1, SAMPLES).astype(int))] if len(finite) else finite
         positions = None if self.positions is None else self.positions[rows]
         return replace(self, values=self.values[rows], positions=positions)
 
@@ -59,6 +60,8 @@ class Explanation:
 def suspect(evidence: Evidence) -> str:
     """Say what is wrong with the values and what they look like; "" if nothing is."""
     sample = evidence.sampled()
+    if not len(sample.values):
+        return "There is no frame in which all joint values are numbers."
     q = sample.motors.angles(sample.values)
     beyond, off = _beyond(sample.arm, q), _off(sample.arm, q, sample.positions)
     still = sample.motors.units == "deg" and np.abs(q).max() < STILL

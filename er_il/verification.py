@@ -40,6 +40,7 @@ class Stretch:
 class Checked:
     """One episode of T frames for P arms."""
 
+    number: int
     status: NDArray[np.str_]  # (T, P)
     error: Array  # (T, P) [rad] largest joint error of the round trip; NaN without the joint vectors
     flagged: Flags  # (T, P) the decoder's status, a joint at its limit or a singularity says that it may not be exact
@@ -76,7 +77,7 @@ class Verification:
 
     def invalid(self) -> dict[int, dict[str, int]]:
         """Frames by status, of the episodes in which not all are ok."""
-        counts = {number: Counter(each.status.ravel().tolist()) for number, each in enumerate(self.episodes)}
+        counts = {each.number: Counter(each.status.ravel().tolist()) for each in self.episodes}
         return {
             number: {status: count for status, count in counter.items() if status != Status.OK}
             for number, counter in counts.items()
@@ -86,12 +87,12 @@ class Verification:
     def stretches(self) -> list[Stretch]:
         """Where arms are near singularities."""
         found = []
-        for number, each in enumerate(self.episodes):
+        for each in self.episodes:
             for arm, label in enumerate(self.arms):
                 values = each.conditioning[:, arm]
                 edges = np.flatnonzero(np.diff(np.concatenate([[False], values < SINGULAR, [False]]).astype(int)))
                 for first, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-                    found.append(Stretch(number, label, first, stop - 1, float(values[first:stop].min())))
+                    found.append(Stretch(each.number, label, first, stop - 1, float(values[first:stop].min())))
         return found
 
     def report(self) -> dict[str, Any]:
@@ -157,7 +158,15 @@ def _check(layout: Layout, episode: Episode, decoded: DecodedEpisode) -> Checked
         if episode.truth is not None:
             error[:, p] = np.abs(q - layout.angles(part, episode.truth)).max(axis=1)
     flagged = (decoded.status != Status.OK) | (decoded.conditioning < SINGULAR) | at_limit
-    return Checked(decoded.status, error, flagged, decoded.conditioning, decoded.position_error, decoded.rotation_error)
+    return Checked(
+        episode.number,
+        decoded.status,
+        error,
+        flagged,
+        decoded.conditioning,
+        decoded.position_error,
+        decoded.rotation_error,
+    )
 
 
 def _suspicions(dataset: Path, features: dict[str, Feature], layout: Layout, episodes: list[Episode]) -> dict[str, str]:

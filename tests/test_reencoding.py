@@ -2,19 +2,19 @@
 
 import hashlib
 import json
-import os
 import sys
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from foreign import ARMS, LEFT_JOINTS, LENGTHS, NAMES, bimanual, write_bimanual
-from lerobot.datasets import LeRobotDataset
+from lerobot.datasets import LeRobotDataset, dataset_metadata
 from lerobot.scripts import lerobot_edit_dataset, lerobot_train
 
 from er_il import encoding
 from er_il.cli import USER_MISTAKE, main
 from er_il.encoding import dataset_info, dataset_layout
+from er_il.hub import find_dataset
 from er_il.rewriting import read_vectors
 from er_il.schema import ACTION, SOURCE_ACTION, STATE
 
@@ -206,8 +206,12 @@ def test_what_lerobot_edits_still_decodes_and_trains(places, tmp_path, monkeypat
         "['lab/a', 'lab/b', 'lab/less']",
         "--operation.roots",
         merge,
+        "--operation.concatenate_data",
+        "false",
     )
-    for dataset, episodes in ((tmp_path / "less", 2), (tmp_path / "merged", 5)):
+    assert len(list(tmp_path.glob("merged/data/*/*.parquet"))) == 3
+    _run(monkeypatch, "encode", tmp_path / "merged", "--to", "era", "--out", tmp_path / "again")
+    for dataset, episodes in ((tmp_path / "less", 2), (tmp_path / "merged", 5), (tmp_path / "again", 5)):
         report = _verified(monkeypatch, dataset, tmp_path / "report" / dataset.name)
         assert report["episodes"] == episodes
         assert max(arm["joint_error_unflagged"]["p100"] for arm in report["arms"].values()) <= 1e-3
@@ -251,7 +255,7 @@ def _mistake(monkeypatch, *arguments):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ((), "panda: 82% of the joint values are outside panda's limits"),
+        ((), "of the joint values are outside panda's limits"),
         ((), "It looks like wrong units: the values are degrees, not radians (--units deg)"),
         (("--arm", "xarm7", "--units", "deg"), "It looks like the wrong arm: the values fit panda (--arm panda)"),
         (("--joints", *reversed(LEFT_JOINTS), "--units", "deg"), f"by their names it is --joints {LEFT_JOINTS[0]}"),
@@ -300,16 +304,16 @@ def test_a_failure_leaves_nothing_behind(places, tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_repository_ids_are_looked_up_by_lerobot(places, tmp_path):
-    """LeRobot finds local datasets under HF_LEROBOT_HOME, which is read when it is imported."""
-    import subprocess
-
-    home = tmp_path / "home"
-    (home / "lab").mkdir(parents=True)
-    (home / "lab/bimanual").symlink_to(places / "source")
-    code = "from er_il.hub import find_dataset; print(find_dataset('lab/bimanual'))"
-    environment = os.environ | {"HF_LEROBOT_HOME": str(home), "HF_HUB_OFFLINE": "1"}
-    found = subprocess.run(
-        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True, cwd=tmp_path
-    )
-    assert found.stdout.strip() == str(home / "lab/bimanual")
+def test_repository_ids_are_looked_up_by_lerobot(places, tmp_path, monkeypatch):
+    """LeRobot finds datasets under HF_LEROBOT_HOME; here every file is a link, as in the hub's cache."""
+    for path in (each for each in (places / "source").rglob("*") if each.is_file()):
+        link = tmp_path / "lab/bimanual" / path.relative_to(places / "source")
+        link.parent.mkdir(parents=True, exist_ok=True)
+        link.symlink_to(path)
+    monkeypatch.setattr(dataset_metadata, "HF_LEROBOT_HOME", tmp_path)
+    assert find_dataset("lab/bimanual") == tmp_path / "lab/bimanual"
+    arms = ("--arms", places / "arms.yaml")
+    _run(monkeypatch, "encode", "lab/bimanual", "--to", "delta_erj", *arms, "--out", tmp_path / "out")
+    assert not any(path.is_symlink() for path in (tmp_path / "out").rglob("*"))
+    report = _verified(monkeypatch, tmp_path / "out", tmp_path / "report")
+    assert max(arm["joint_error_unflagged"]["p100"] for arm in report["arms"].values()) <= 1e-3

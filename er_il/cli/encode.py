@@ -86,7 +86,7 @@ def encode(
     console = Console()
     with make_progress(console) as progress:
         bar = progress.add_task(f"Encode as {to}", total=None)
-        layout = reencode(
+        written = reencode(
             source,
             out,
             to,
@@ -95,6 +95,9 @@ def encode(
             keep=keep,
             on_progress=lambda done, total: progress.update(bar, completed=done, total=total),
         )
-    names = layout.encoded_names
+    names = written.layout.encoded_names
     console.print(f"{out}: {len(names)} dimensions: {', '.join(names)}", highlight=False, soft_wrap=True)
+    if written.statuses:
+        listed = ", ".join(f"{status} {count}" for status, count in written.statuses.most_common())
+        console.print(f"Decoded commands by status: {listed}", highlight=False)
     console.print(f"Check it: er-il verify {out}", highlight=False, soft_wrap=True)

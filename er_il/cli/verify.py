@@ -1,10 +1,20 @@
 """``er-il verify``: whether an encoded dataset gives its joints back."""
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from tyro.conf import Positional
 
 SHOWN = 5  # rows of a list that are printed; the report has all
+
+_ROWS: dict[str, Callable[[dict[str, Any]], str]] = {
+    "frames flagged": lambda arm: str(arm["flagged"]),
+    "joint error [rad] p50, p95, p99, max": lambda arm: _numbers(arm["joint_error"]),
+    "joint error [rad] max, not flagged": lambda arm: _numbers(arm["joint_error_unflagged"], "p100"),
+    "position error [m] p50, p95, p99, max": lambda arm: _numbers(arm["position_error"]),
+    "rotation error [rad] p50, p95, p99, max": lambda arm: _numbers(arm["rotation_error"]),
+}
 
 
 def verify(dataset: Positional[str], *, out: Path | None = None) -> None:
@@ -38,14 +48,10 @@ def verify(dataset: Positional[str], *, out: Path | None = None) -> None:
             folder, cores(), lambda done, total: progress.update(bar, completed=done, total=total)
         )
     report = verification.report()
-    table = Table("arm", "frames", "flagged", "joint error [rad] p50", "p95", "p99", "max", "max unflagged")
-    for label, arm in report["arms"].items():
-        errors = (arm["joint_error"] or {}).values()
-        clear = (arm["joint_error_unflagged"] or {}).get("p100")
-        cells = [f"{value:.1e}" for value in errors] or ["not kept"] * 4
-        table.add_row(
-            label, str(report["frames"]), str(arm["flagged"]), *cells, "" if clear is None else f"{clear:.1e}"
-        )
+    table = Table("", *report["arms"])
+    for row, of_arm in _ROWS.items():
+        table.add_row(row, *(of_arm(arm) for arm in report["arms"].values()))
+    console.print(f"{report['frames']} frames, {report['episodes']} episodes", highlight=False)
     console.print(table)
     for episode, counts in list(report["invalid_by_episode"].items())[:SHOWN]:
         listed = ", ".join(f"{status} {count}" for status, count in counts.items())
@@ -66,3 +72,9 @@ def verify(dataset: Positional[str], *, out: Path | None = None) -> None:
     console.print(f"{path}\n{target / 'round_trip.png'}", highlight=False, soft_wrap=True)
     if verification.suspicions:
         raise DatasetError(" ".join(f"{label}: {text}" for label, text in verification.suspicions.items()))
+
+
+def _numbers(percentiles: dict[str, float] | None, *chosen: str) -> str:
+    if percentiles is None:
+        return "joints not kept"
+    return "  ".join(f"{value:.0e}" for name, value in percentiles.items() if not chosen or name in chosen) or "none"
