@@ -70,7 +70,11 @@ def make_world(recipe: Recipe) -> gymnasium.Env[Any, Any]:
 
 
 def record_demo(world: gymnasium.Env[Any, Any], seed: int) -> Demo | str:
-    """Play one demonstration. Returns it, or why it is dropped."""
+    """Play one demonstration. Returns it, or why it is dropped.
+
+    It goes on to the leader's end, beyond the moment of success: from a demonstration that breaks off
+    there, a policy learns to stop just short of it.
+    """
     observation, info = world.reset(seed=seed)
     rows: list[tuple[Any, Floats]] = []
     unwrapped: Any = world.unwrapped
@@ -79,7 +83,7 @@ def record_demo(world: gymnasium.Env[Any, Any], seed: int) -> Demo | str:
             action = np.asarray(target, dtype=np.float32)
             rows.append((observation, action))
             observation, _, terminated, truncated, info = world.step(action)
-            if terminated or truncated:
+            if truncated or (terminated and not info["is_success"]):
                 break
     except PlanError:
         return "no plan"

@@ -16,7 +16,7 @@ from sim_tasks.scene import scene_spec
 CUP = "cup"
 GRASP_HEIGHT = 0.09  # [m] of the fingertips above the surface the cup stands on, at mid-stem
 PITCH = np.radians(20)  # of the hand below the horizontal
-LIFT = np.array([-0.03, 0.0, 0.022])  # [m] of the hand, from the grasp
+LIFT = np.array([-0.03, 0.0, 0.025])  # [m] of the hand, from the grasp
 FREED = 0.01  # [m] of the foot above the surface
 TIPPED = np.cos(np.radians(25))  # cosine of the tilt from which a stemmed cup falls
 CLOSED = 0.5  # opening below which the gripper counts as closed

@@ -1,10 +1,13 @@
+import inspect
 import json
 
+import gymnasium
+import numpy as np
 import pytest
 
 from er_il.errors import DatasetError, UnknownNameError
 from er_il.recipe import DEMO_SEED_BASE, Recipe, recipe_names
-from er_il.tasks import task_names
+from er_il.tasks import task_id, task_names
 
 FIRST_EVALUATION_SEED = 1000  # LeRobot's
 
@@ -74,6 +77,21 @@ def test_files_that_are_no_recipe(tmp_path):
         Recipe.from_file(tmp_path / "missing.yaml")
     with pytest.raises(UnknownNameError, match=r"'sweep'\. Valid: lift_cup, reach_cup"):
         Recipe.load("sweep")
+
+
+@pytest.mark.parametrize("name", recipe_names())
+def test_a_recipe_declares_the_randomisation_that_evaluation_has(name):
+    """Evaluation makes its environments without a recipe: the defaults must be what was recorded."""
+    task = type(gymnasium.make(task_id(name)).unwrapped)
+    defaults = {
+        key: parameter.default
+        for base in task.__mro__
+        if "__init__" in vars(base)
+        for key, parameter in inspect.signature(base.__init__).parameters.items()
+    }
+    for key, value in Recipe.load(name).randomisation.items():
+        assert np.allclose(value, defaults[key]), key
+    assert {key for key in defaults if key.endswith("_range")} == set(Recipe.load(name).randomisation)
 
 
 def _first(seeds, number):
