@@ -14,8 +14,10 @@ from er_il.encoding import dataset_info, dataset_layout, joints_column, read_epi
 from er_il.kinematics import LIMIT_MARGIN, Status
 from er_il.layout import Layout
 from er_il.rewriting import read_vectors
+from er_il.rotation import Quaternion
 from er_il.round_trip import SINGULAR
 from er_il.schema import STATE, Feature, dimension_names
+from er_il.spaces.pose import PoseSpace
 from er_il.suspicion import Evidence, suspect
 
 Array = NDArray[np.float64]
@@ -57,6 +59,7 @@ class Verification:
     episodes: tuple[Checked, ...]
     compared: bool  # whether the joint vectors were there to compare with
     suspicions: dict[str, str]  # arm -> what is wrong with its joint values
+    other_side: dict[str, float]  # arm -> share of quaternions beyond the hemisphere of their reference
 
     @property
     def arms(self) -> tuple[str, ...]:
@@ -107,6 +110,7 @@ class Verification:
                 "position_error": _percentiles(self.gathered("position_error")[arm]),
                 "rotation_error": _percentiles(self.gathered("rotation_error")[arm]),
                 "flagged": int(sum(each.flagged[:, arm].sum() for each in self.episodes)),
+                "quaternions_other_side": self.other_side.get(label, 0.0),
                 "suspicion": self.suspicions.get(label, ""),
             }
         return {
@@ -146,7 +150,7 @@ def verify(dataset: Path, workers: int, on_progress: Callable[[int, int], object
 
     decoded = decode_episodes(layout, episodes, workers, advance)
     checked = tuple(_check(layout, *each) for each in zip(episodes, decoded, strict=True))
-    return Verification(layout, checked, truth is not None, suspicions)
+    return Verification(layout, checked, truth is not None, suspicions, _other_side(layout, episodes))
 
 
 def _check(layout: Layout, episode: Episode, decoded: DecodedEpisode) -> Checked:
@@ -167,6 +171,17 @@ def _check(layout: Layout, episode: Episode, decoded: DecodedEpisode) -> Checked
         decoded.position_error,
         decoded.rotation_error,
     )
+
+
+def _other_side(layout: Layout, episodes: list[Episode]) -> dict[str, float]:
+    """Share of quaternions beyond their hemisphere, where another episode may have them with the other sign."""
+    found = {}
+    for part in layout.parts:
+        if isinstance(part.space, PoseSpace) and isinstance(part.space.rotation, Quaternion):
+            first = layout.encoded_names.index(part.names[len(POSITION_NAMES)])
+            quaternions = np.concatenate([each.actions[:, first : first + 4] for each in episodes])
+            found[part.label or part.space.arm.name] = float((quaternions @ part.space.rotation.reference < 0).mean())
+    return found
 
 
 def _suspicions(dataset: Path, features: dict[str, Feature], layout: Layout, episodes: list[Episode]) -> dict[str, str]:

@@ -1,5 +1,6 @@
 """The picture of a verification: errors of the round trip, and distance from singularities, frame by frame."""
 
+import itertools
 from pathlib import Path
 
 import matplotlib as mpl
@@ -26,6 +27,8 @@ def plot(verification: Verification, path: Path, title: str) -> None:
             frames, flags = np.arange(starts[-1]), flagged[arm].astype(bool)
             left, right = axes[arm]
             for chosen, colour, name in ((~flags, "tab:blue", "clear"), (flags, "tab:orange", "flagged")):
+                if not chosen.any():
+                    continue
                 shown = np.maximum(errors[arm][chosen], FLOOR)
                 left.plot(frames[chosen], shown, ".", markersize=2, color=colour, label=name, rasterized=True)
             left.axhline(EXACT, color="grey", linewidth=0.8, linestyle="--")
@@ -35,7 +38,8 @@ def plot(verification: Verification, path: Path, title: str) -> None:
             sigma = verification.gathered("conditioning")[arm]
             right.set(title=f"{label}: smallest singular value", ylabel="m and rad mixed")
             if np.all(np.isfinite(sigma)):
-                right.plot(frames, sigma, linewidth=0.6, color="tab:green", rasterized=True)
+                for first, stop in itertools.pairwise(starts.tolist()):
+                    right.plot(frames[first:stop], sigma[first:stop], linewidth=0.6, color="tab:green", rasterized=True)
                 right.axhline(SINGULAR, color="grey", linewidth=0.8, linestyle="--")
                 right.set_ylim(bottom=0)
             else:

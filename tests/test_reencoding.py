@@ -111,6 +111,7 @@ def test_the_round_trip_is_exact_where_the_elbow_is_commanded(places, tmp_path, 
         assert error <= 1e-3 if kind != "task" else error > 1e-3
         assert report["arms"][arm]["position_error"]["p100"] <= 1e-4
         assert report["arms"][arm]["suspicion"] == ""
+        assert report["arms"][arm]["quaternions_other_side"] == 0
 
 
 def test_back_to_joints_through_the_decoder(places, tmp_path, monkeypatch):
@@ -127,18 +128,20 @@ def test_back_to_joints_through_the_decoder(places, tmp_path, monkeypatch):
 
 
 def test_flagged_frames_and_stretches_near_singularities_are_found(places, tmp_path, monkeypatch):
-    """Episode 1 passes through the stretched elbow; episode 2 has an action that cannot be decoded."""
+    """Episode 1 passes through the stretched elbow, 2 has an action that cannot be decoded, in 3 the hand spins."""
     names = [
         f"{joint}.pos" for joint in dataset_layout(dataset_info(places / "erj").features).parts[0].space.arm.joints
     ]
     feature = {"dtype": "float32", "shape": (7,), "names": names}
     dataset = LeRobotDataset.create("lab/one", 20, {ACTION: feature}, root=tmp_path / "one", video_backend="pyav")
     home = np.array([0.3, 0.2, 0.1, -1.5, 0.2, 1.7, 0.8], dtype=np.float32)
-    for episode in range(3):
+    for episode in range(4):
         for t in range(30):
             row = home + 0.01 * t
             if episode == 1:
                 row[3] = -1.5 + 1.4 * np.sin(np.pi * t / 29)
+            if episode == 3:
+                row[[0, 6]] = np.linspace(-2.5, 2.5, 30)[t] * np.array([1, -1])
             dataset.add_frame({ACTION: np.float32(row), "task": "stretch"})
         dataset.save_episode()
     dataset.finalize()
@@ -152,6 +155,7 @@ def test_flagged_frames_and_stretches_near_singularities_are_found(places, tmp_p
     assert any(each["first"] <= 15 <= each["last"] for each in stretches)
     assert report["arms"]["panda"]["joint_error_unflagged"]["p100"] <= 1e-3
     assert 1 < report["arms"]["panda"]["flagged"] < 30
+    assert 0 < report["arms"]["panda"]["quaternions_other_side"] < 0.25
 
 
 def _spoil(dataset, row):

@@ -30,6 +30,7 @@ def verify(dataset: Positional[str], *, out: Path | None = None) -> None:
     import json
 
     from rich.console import Console
+    from rich.markup import escape
     from rich.table import Table
 
     from er_il.cli.progress import make_progress
@@ -50,7 +51,7 @@ def verify(dataset: Positional[str], *, out: Path | None = None) -> None:
     report = verification.report()
     table = Table("", *report["arms"])
     for row, of_arm in _ROWS.items():
-        table.add_row(row, *(of_arm(arm) for arm in report["arms"].values()))
+        table.add_row(escape(row), *(of_arm(arm) for arm in report["arms"].values()))
     console.print(f"{report['frames']} frames, {report['episodes']} episodes", highlight=False)
     console.print(table)
     for episode, counts in list(report["invalid_by_episode"].items())[:SHOWN]:
@@ -61,10 +62,19 @@ def verify(dataset: Positional[str], *, out: Path | None = None) -> None:
             f"Episode {stretch['episode']}, {stretch['arm']}: near a singularity in frames {stretch['first']} to "
             f"{stretch['last']} (smallest singular value {stretch['smallest']:.1e})",
             highlight=False,
+            soft_wrap=True,
         )
     more = max(0, len(report["invalid_by_episode"]) - SHOWN) + max(0, len(report["near_singularity"]) - SHOWN)
     if more:
         console.print(f"and {more} more in the report", highlight=False)
+    for label, share in verification.other_side.items():
+        if share > 0:
+            console.print(
+                f"{label}: {share:.1%} of the quaternions are beyond their hemisphere, where episodes may disagree "
+                "about the sign. Encode with --rotation rot6d.",
+                highlight=False,
+                soft_wrap=True,
+            )
     target = out or Path("outputs/verify") / folder.name
     plot(verification, target / "round_trip.png", dataset)
     path = target / "report.json"
