@@ -20,7 +20,7 @@ def test_the_pages_commands_run(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     Path("arms.yaml").write_text(arms[1])
     write_bimanual(Path("my_robot"))
-    commands = re.findall(r"^    (er-il .*(?:\\\n.*)*)$", PAGE, re.MULTILINE)
+    commands = re.findall(r"^    (er-il (?:[^\\\n]|\\\n)*)$", PAGE, re.MULTILINE)
     assert len(commands) == 6
     for command in commands:
         monkeypatch.setattr(sys, "argv", shlex.split(command.replace("\\\n", " ")))
