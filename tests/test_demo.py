@@ -49,9 +49,9 @@ def test_a_folder_with_something_else_is_left_alone(tmp_path: Path) -> None:
 
 
 def test_wrong_names_and_numbers_list_the_valid_ones(tmp_path: Path) -> None:
-    with pytest.raises(UnknownNameError, match="Unknown decoder 'task'. Valid: .*task-nearest"):
+    with pytest.raises(UnknownNameError, match=r"Unknown decoder 'task'. Valid: .*task-nearest"):
         small(tmp_path, decoders=("task",))
-    with pytest.raises(UnknownNameError, match="Unknown task 'cup'. Valid: .*reach_cup"):
+    with pytest.raises(UnknownNameError, match=r"Unknown task 'cup'. Valid: .*reach_cup"):
         small(tmp_path, task="cup")
     with pytest.raises(ErIlError, match="0 rollouts"):
         small(tmp_path, rollouts=0)

@@ -7,7 +7,9 @@ from er_il.statistics import exact_interval, paired_difference
 
 
 # The paper's cells with n = 10, as percentages.
-@pytest.mark.parametrize(("successes", "low", "high"), [(10, 69.2, 100), (9, 55.5, 99.7), (4, 12.2, 73.8), (0, 0, 30.8)])
+@pytest.mark.parametrize(
+    ("successes", "low", "high"), [(10, 69.2, 100), (9, 55.5, 99.7), (4, 12.2, 73.8), (0, 0, 30.8)]
+)
 def test_exact_intervals_of_ten_episodes(successes: int, low: float, high: float):
     assert 100 * np.array(exact_interval(successes, 10)) == pytest.approx([low, high], abs=0.06)
 

@@ -1,0 +1,29 @@
+"""Render the README's tables from the results they come from: ``uv run python docs/render_readme.py``.
+
+A block between ``<!-- results/NAME -->`` and ``<!-- /results/NAME -->`` is the table of
+``results/NAME/report.json``.
+"""
+
+import json
+import re
+from pathlib import Path
+
+from er_il.report import REPORT, success_table
+
+ROOT = Path(__file__).resolve().parents[1]
+README = ROOT / "README.md"
+BLOCK = re.compile(r"(<!-- (results/\w+) -->\n).*?(<!-- /\2 -->)", re.DOTALL)
+
+
+def rendered(text: str) -> str:
+    """Return the text with every results block filled from its file."""
+
+    def table(block: re.Match[str]) -> str:
+        report = json.loads((ROOT / block[2] / REPORT).read_text())
+        return f"{block[1]}{success_table(report['cells'])}\n{block[3]}"
+
+    return BLOCK.sub(table, text)
+
+
+if __name__ == "__main__":
+    README.write_text(rendered(README.read_text()))
