@@ -23,7 +23,7 @@ def sign(dataset: Path, info: DatasetInfo, layout: Layout, source: str, options:
         dataset: Its folder.
         info: Its metadata.
         layout: How its actions are encoded.
-        source: The dataset it was made from, as the user named it.
+        source: The dataset it was made from, its name or repository id.
         options: What else was asked for, as JSON.
     """
     path = dataset / HISTORY

@@ -75,7 +75,8 @@ def reencode(
     def finish(partial: Path) -> None:
         written = dataset_info(partial)
         options: dict[str, Any] = {"to": kind, "rotation": rotation, "decoded": decode}
-        card.sign(partial, written, dataset_layout(written.features), source, options)
+        name = folder.resolve().name if Path(source).exists() else source  # not where it lies on this machine
+        card.sign(partial, written, dataset_layout(written.features), name, options)
 
     statuses: Counter[str] = Counter()
     if decode:

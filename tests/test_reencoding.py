@@ -11,7 +11,7 @@ from foreign import ARMS, LEFT_JOINTS, LENGTHS, NAMES, bimanual, write_bimanual
 from lerobot.datasets import LeRobotDataset, dataset_metadata
 from lerobot.scripts import lerobot_edit_dataset, lerobot_train
 
-from er_il import encoding
+from er_il import decoding, encoding
 from er_il.cli import USER_MISTAKE, main
 from er_il.encoding import dataset_info, dataset_layout
 from er_il.hub import find_dataset
@@ -73,7 +73,7 @@ def test_only_the_actions_differ(places):
     card = (encoded / "README.md").read_text()
     assert card.startswith("---")
     assert "| 8 | `right_ee.x` | end-effector position [m] |" in card
-    assert json.loads((encoded / "meta/er_il.json").read_text())[0]["source"] == str(source)
+    assert json.loads((encoded / "meta/er_il.json").read_text())[0]["source"] == "source"
 
 
 def test_statistics_are_lerobots(places, tmp_path):
@@ -295,6 +295,20 @@ def test_commands_that_cannot_work_are_one_line(places, tmp_path, monkeypatch, c
         assert message in error
         assert len(error.splitlines()) == 1, error
     assert sorted(path.name for path in tmp_path.iterdir()) == ["old"]
+
+
+def test_worker_processes_decode_the_same(places, monkeypatch):
+    info = dataset_info(places / "erj")
+    layout = dataset_layout(info.features)
+    episodes = encoding.read_episodes(places / "erj", info, layout)
+    alone = decoding.decode_episodes(layout, episodes, workers=1)
+    monkeypatch.setattr(decoding, "FEW_FRAMES", 0)
+    done: list[int] = []
+    shared = decoding.decode_episodes(layout, episodes, workers=2, advance=done.append)
+    assert done == list(LENGTHS)
+    for one, other in zip(alone, shared, strict=True):
+        assert np.array_equal(one.vectors, other.vectors)
+        assert np.array_equal(one.conditioning, other.conditioning)
 
 
 def test_a_failure_leaves_nothing_behind(places, tmp_path, monkeypatch):

@@ -75,7 +75,7 @@ def verify(dataset: Positional[str], *, out: Path | None = None) -> None:
                 highlight=False,
                 soft_wrap=True,
             )
-    target = out or Path("outputs/verify") / folder.name
+    target = out or Path("outputs/verify") / Path(dataset).name
     plot(verification, target / "round_trip.png", dataset)
     path = target / "report.json"
     path.write_text(json.dumps({"meta": provenance() | {"dataset": dataset}} | report, indent=2))
