@@ -20,6 +20,7 @@ COMMANDS: dict[str, str] = {
     "replay": "replay",
     "train": "train",
     "verify": "verify",
+    "view": "view",
 }
 
 USER_MISTAKE = 2  # exit code, as for unknown options

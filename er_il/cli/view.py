@@ -1,0 +1,56 @@
+"""``er-il view``: an episode in Rerun."""
+
+from pathlib import Path
+
+from tyro.conf import Positional
+
+
+def view(
+    source: Positional[Path],
+    *,
+    episode: int | None = None,
+    arm: str = "",
+    save: Path | None = None,
+    spawn: bool = False,
+    serve: bool = False,
+) -> None:
+    """Show an episode in Rerun: the arm in its world, cameras, curves, and the status of each decode.
+
+    Without options the viewer opens on this screen.
+
+    Args:
+        source: Folder of a dataset, or the trace (.npz) of a rollout.
+        episode: Episode of the dataset; the first if omitted.
+        arm: Arm of a dataset that has several.
+        save: File (.rrd) to write.
+        spawn: Open the viewer on this screen.
+        serve: Serve a viewer for browsers.
+    """
+    import time
+
+    from rich.console import Console
+
+    from er_il.viewer import show
+    from er_il.viewer.recording import view_of
+    from er_il.viewer.source import read_source
+
+    console = Console()
+    spawn = spawn or not (save or serve)
+    if spawn:
+        show.require_display()
+    trace, shapes = read_source(source, episode, arm)
+    if not shapes:
+        console.print("No simulated task made this: the arm is shown without its world.", highlight=False)
+    if save:
+        show.save_recording(trace, shapes, save)
+        console.print(str(save), highlight=False, soft_wrap=True)
+    if spawn:
+        show.spawn(view_of(trace, shapes))
+    if serve:
+        shown = view_of(trace, shapes)
+        console.print(f"{show.serve(shown)}\nCtrl-C ends it.", highlight=False, soft_wrap=True)
+        try:
+            while True:
+                time.sleep(1)
+        except KeyboardInterrupt:
+            return

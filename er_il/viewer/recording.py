@@ -1,0 +1,73 @@
+"""The recording of an episode, put together from its parts."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from er_il.kinematics import Status
+from er_il.portable import arm_from_spec
+from er_il.scene import Shape
+from er_il.spaces import from_spec
+from er_il.trace import Trace
+from er_il.viewer.arm import log_arm
+from er_il.viewer.blueprint import ABOUT, FRAME, TIME, blueprint
+from er_il.viewer.curves import curves_of, log_curves, log_path, log_status
+from er_il.viewer.world import log_cameras, log_scene
+
+APPLICATION = "er_il"
+
+
+@dataclass(frozen=True)
+class View:
+    """A recording that waits for a sink (a file, a viewer), and how to lay it out."""
+
+    recording: rr.RecordingStream
+    layout: rrb.Blueprint
+
+
+def view_of(trace: Trace, shapes: Sequence[Shape] = ()) -> View:
+    """Record an episode; equal episodes give equal recordings.
+
+    Args:
+        trace: The episode.
+        shapes: The world around the arm.
+
+    Raises:
+        SpecError: the trace's action space does not fit the arm.
+        ArmError: a mesh of the arm is missing.
+    """
+    space = from_spec(trace.spec, arm_from_spec(trace.spec["arm"]))
+    curves = curves_of(trace, space)
+    # Nothing is logged with the clock: the only times are the episode's own.
+    recording = rr.RecordingStream(APPLICATION, recording_id=_name(trace), send_properties=False)
+    times = [rr.TimeColumn(FRAME, sequence=np.arange(len(trace))), rr.TimeColumn(TIME, duration=trace.times)]
+    log_arm(recording, times, space.arm, trace.q, trace.gripper)
+    log_scene(recording, times, trace, shapes)
+    log_cameras(recording, times, trace)
+    log_path(recording, trace, space)
+    log_curves(recording, times, curves)
+    log_status(recording, times, trace)
+    recording.log(ABOUT, rr.TextDocument(_about(trace), media_type=rr.MediaType.MARKDOWN), static=True)
+    return View(recording, blueprint(curves, list(trace.images)))
+
+
+def _name(trace: Trace) -> str:
+    return f"{trace.task or 'episode'}-{trace.label}-{trace.seed}"
+
+
+def _about(trace: Trace) -> str:
+    failed = sum(status != Status.OK for status in trace.status)
+    rows = {
+        "Task": trace.task or "unknown",
+        "Seed": trace.seed,
+        "Who acted": trace.label,
+        "Outcome": trace.outcome or "unknown",
+        "Action space": trace.spec["space"],
+        "Arm": f"{trace.spec['arm']['name']} ({len(trace.joint_names)} joints)",
+        "Control steps": f"{len(trace)} at {1 / trace.period:g} Hz",
+        "Decodes with a status": f"{failed} of {len(trace)}",
+    }
+    return "\n".join(["| | |", "|---|---|", *(f"| **{key}** | {value} |" for key, value in rows.items())])

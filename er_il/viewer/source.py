@@ -1,0 +1,63 @@
+"""What can be viewed: the trace of a rollout, or an episode of a dataset, each with the world around it."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+
+from er_il.errors import DatasetError
+from er_il.record import RECORD, Record
+from er_il.scene import Shape
+from er_il.tasks import task_id, task_names
+from er_il.trace import SUFFIX, Trace
+
+
+def read_source(source: Path, episode: int | None = None, arm: str = "") -> tuple[Trace, list[Shape]]:
+    """Read what is to be viewed, and the world around the arm; there is none unless a simulated task made the data.
+
+    Args:
+        source: A trace (``.npz``), or the folder of a dataset that says what its actions mean.
+        episode: Which episode of a dataset; the first if omitted.
+        arm: Which arm of a dataset of several.
+
+    Raises:
+        DatasetError: there is no such trace, dataset, or episode.
+        UnknownNameError: the dataset has no such arm.
+    """
+    if source.is_dir():
+        from er_il.viewer.episode import trace_of_episode  # LeRobot: seconds of imports that a trace does without
+
+        trace = trace_of_episode(source, episode or 0, arm)
+        if not (source / RECORD).is_file():
+            return trace, []
+        recipe = Record.read(source).recipe
+        trace = replace(trace, task=recipe.task)
+        return trace, shapes_of(trace, replace(recipe, cameras=()).environment)
+    if not source.exists():
+        raise DatasetError(f"There is no dataset or trace {source}.")
+    if source.suffix != SUFFIX:
+        raise DatasetError(f"{source} is neither the folder of a dataset nor a trace ({SUFFIX}) of a rollout.")
+    if episode is not None or arm:
+        raise DatasetError(f"{source} holds one episode of one arm: leave out --episode and --arm.")
+    trace = Trace.load(source)
+    return trace, shapes_of(trace)
+
+
+def shapes_of(trace: Trace, environment: Mapping[str, Any] | None = None) -> list[Shape]:
+    """The world of a trace: that of its task on its seed; empty if no simulated task has that name.
+
+    Args:
+        trace: The episode.
+        environment: Keyword arguments of the task's environment; the trace's arm if omitted.
+    """
+    if trace.task not in task_names():
+        return []
+    env = gymnasium.make(task_id(trace.task), **(environment or {"arm": trace.spec["arm"]["name"]}))
+    try:
+        env.reset(seed=trace.seed)
+        world: Any = env.unwrapped
+        return list(world.scene_geometry())
+    finally:
+        env.close()
