@@ -48,7 +48,7 @@ class Wiring:
         if preset is not None and not any(given):
             return preset
         if preset is None and not self.ee_frame:
-            raise ArmError(f"A URDF needs --ee-frame, the link whose pose actions command, as {self.arm} does.")
+            raise ArmError(f"{self.arm} is a URDF: give --ee-frame too, the link whose pose the actions command.")
         if self.angle_frames and len(self.angle_frames) != 3:
             raise ArmError("The angle frames are three links: shoulder, elbow, wrist.")
         frames = ArmAngleFrames(*self.angle_frames) if self.angle_frames else preset and preset.angle_frames

@@ -11,7 +11,7 @@ from foreign import ARMS, LEFT_JOINTS, LENGTHS, NAMES, bimanual, write_bimanual
 from lerobot.datasets import LeRobotDataset, dataset_metadata
 from lerobot.scripts import lerobot_edit_dataset, lerobot_train
 
-from er_il import decoding, encoding
+from er_il import Arm, decoding, encoding
 from er_il.cli import USER_MISTAKE, main
 from er_il.encoding import dataset_info, dataset_layout
 from er_il.hub import find_dataset
@@ -295,6 +295,20 @@ def test_commands_that_cannot_work_are_one_line(places, tmp_path, monkeypatch, c
         assert message in error
         assert len(error.splitlines()) == 1, error
     assert sorted(path.name for path in tmp_path.iterdir()) == ["old"]
+
+
+def test_an_arm_of_a_file_needs_it_only_once(places, tmp_path, monkeypatch, capsys):
+    urdf = tmp_path / "arm.urdf"
+    urdf.write_text(Arm.preset("panda").urdf.read_text())
+    encode = ("encode", places / "source", "--to", "era", "--out", tmp_path / "era", "--arm", urdf, "--units", "deg")
+    encode = (*encode, "--joints", *LEFT_JOINTS)
+    _mistake(monkeypatch, *encode)
+    assert "give --ee-frame too" in capsys.readouterr().err
+    frames = ("--ee-frame", "panda_hand", "--angle-frames", "panda_link2", "panda_link4", "panda_link6")
+    _run(monkeypatch, *encode, *frames)
+    urdf.unlink()
+    report = _verified(monkeypatch, tmp_path / "era", tmp_path / "report")
+    assert report["arms"]["panda"]["joint_error_unflagged"]["p100"] <= 1e-3
 
 
 def test_worker_processes_decode_the_same(places, monkeypatch):
