@@ -73,7 +73,7 @@ class Cabinet:
 
     front: float = 0.42  # x of the opening
     depth: float = 0.40
-    inner_width: float = 0.30
+    inner_width: float = 0.34
     floor: float = 0.50  # z of the compartment's floor
     ceiling: float = 0.76
     wall: float = 0.018

@@ -26,7 +26,7 @@ class ReachCup(CupTask):
     start = (1.25, -1.01, -0.32, -1.86, -1.18, 1.85, 1.44)  # above and in front of the cabinet
     way = (
         ((-0.34, 0.0, 0.04), 1.2),  # down before the opening, the elbow out, clear of the wall
-        ((-0.21, 0.0, 0.02), 1.15),
+        ((-0.24, 0.0, 0.02), 1.15),
         ((-0.10, 0.0, 0.01), 0.1),  # the elbow comes up while the forearm is still outside
         ((0.0, 0.0, 0.0), 0.1),
     )
