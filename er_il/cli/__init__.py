@@ -14,6 +14,7 @@ from er_il.errors import ErIlError
 COMMANDS: dict[str, str] = {
     "attach": "attach",
     "demo": "demo",
+    "doctor": "doctor",
     "encode": "encode",
     "eval": "eval",
     "generate": "generate",

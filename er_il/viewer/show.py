@@ -1,12 +1,11 @@
 """Where a recording goes: a file, a viewer on this screen, or a browser anywhere."""
 
-import os
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 import rerun as rr
 
+from er_il.display import has_display
 from er_il.errors import ErIlError
 from er_il.scene import Shape
 from er_il.trace import Trace
@@ -38,11 +37,6 @@ def save_recording(trace: Trace, shapes: Sequence[Shape], path: Path) -> None:
     view.recording.save(partial, default_blueprint=view.layout)
     view.recording.disconnect()  # writes what is left
     partial.rename(path)
-
-
-def has_display() -> bool:
-    """Whether there is a screen for Rerun's viewer."""
-    return not sys.platform.startswith("linux") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 def require_display() -> None:
