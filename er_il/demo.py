@@ -7,7 +7,6 @@ goes on where it was. Training and rollouts run side by side, one thread each.
 import json
 import os
 import re
-import subprocess
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -23,7 +22,7 @@ from er_il.recording import generate
 from er_il.results import load_cell, save_cell
 from er_il.showing import film_rollouts, telling_seed, write_report
 from er_il.tasks import task_id
-from er_il.training import Training, default_config, default_steps, executable
+from er_il.training import Training, default_config, default_steps
 from er_il.workers import worker_pool
 
 TASK = "reach_cup"
@@ -181,12 +180,11 @@ def _one_thread() -> None:
 def _train(training: Training) -> None:
     if training.finished:
         return
-    training.clear()
     log = _log(training)
     log.parent.mkdir(parents=True, exist_ok=True)
     with log.open("w") as file:
-        finished = subprocess.run(executable(training.command), stdout=file, stderr=subprocess.STDOUT, check=False)
-    if finished.returncode:
+        code = training.run(file)
+    if code:
         raise ErIlError(f"The training of {training.space} failed; see {log}.")
 
 

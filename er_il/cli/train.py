@@ -29,13 +29,12 @@ def train(
         out: Folder of the policy; policies/<task>/<space> if omitted.
     """
     import shlex
-    import subprocess
     import sys
 
     from er_il.errors import UnknownNameError
     from er_il.spaces import SPACES
     from er_il.tasks import task_id
-    from er_il.training import Training, default_config, default_steps, executable
+    from er_il.training import Training, default_config, default_steps
 
     task_id(task)
     if space not in SPACES:
@@ -55,9 +54,7 @@ def train(
             f"{training.policy}: trained already, for {training.done_steps} steps. Remove {training.out} to start anew."
         )
         return
-    training.clear()
-    print(shlex.join(training.command), flush=True)
-    finished = subprocess.run(executable(training.command))
-    if finished.returncode:
-        sys.exit(finished.returncode)
+    print(shlex.join(["OMP_NUM_THREADS=1", *training.command]), flush=True)
+    if code := training.run():
+        sys.exit(code)
     print(training.policy)
