@@ -15,10 +15,11 @@ from rerun.experimental import RrdReader
 from rich.progress import Progress
 from scipy.spatial.transform import Rotation
 
-from er_il import Arm
+from er_il import Arm, make_action_space
 from er_il.cli import USER_MISTAKE, main
 from er_il.errors import ArmError
 from er_il.kinematics import kinematics_of
+from er_il.portable import arm_spec
 from er_il.recipe import Recipe
 from er_il.recording import generate
 from er_il.scene import POSE_NAMES
@@ -241,6 +242,21 @@ def test_mistakes_are_one_line(
     assert message.format(**places) in error
     assert len(error.strip().splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
+
+
+def test_an_arm_without_shapes_is_drawn_as_lines(shown: SimpleNamespace, tmp_path: Path) -> None:
+    urdf = tmp_path / "mine.urdf"
+    urdf.write_text(ARM.model_xml)
+    mine = Arm.from_urdf(urdf, name="mine", ee_frame=ARM.ee_frame, joints=ARM.joints, home=ARM.home)
+    trace = read_source(shown.root, EPISODE)[0]
+    spec = make_action_space("erj", mine).spec()
+    spec = spec | {"arm": spec["arm"] | arm_spec(mine)}
+    save_recording(replace(trace, task="", spec=spec), [], tmp_path / "mine.rrd")
+    recorded = Recorded(tmp_path / "mine.rrd")
+    assert {f"/arm/bones/{joint}" for joint in ARM.joints} <= recorded.entities
+    q = shown.columns[STATE][:, : ARM.dof].astype(np.float64)
+    np.testing.assert_allclose(recorded.pose_of(ARM.ee_frame), kinematics_of(ARM).fk_batch(q), atol=1e-5)
+    assert not any(entity.startswith("/arm/bones") for entity in shown.recorded.entities)
 
 
 URDF = """<robot name="two"><link name="base"><visual><geometry><mesh filename="package://two_arm/meshes/{mesh}"/>

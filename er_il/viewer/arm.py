@@ -16,11 +16,13 @@ from er_il.kinematics import kinematics_of
 from er_il.trace import Array
 
 ARM = "arm"
+BONES = f"{ARM}/bones"  # of an arm without shapes, as those that travel with their data
 FIXED = f"{ARM}/fixed"  # transforms of the URDF at rest
 JOINTS = f"{ARM}/joints"
 ROOT_FRAME = "tf#/"  # Rerun's name for the frame of the whole recording: the arm's base
 PACKAGE = "package://"
-COLOUR = "0.85 0.87 0.9 1.0"
+BONE_RADIUS = 0.01  # [m]
+COLOUR = (0.85, 0.87, 0.9, 1.0)
 
 
 def log_arm(
@@ -39,6 +41,8 @@ def log_arm(
         urdf.write_text(drawable_urdf(arm.urdf))
         tree = UrdfTree.from_file_path(urdf, ARM, static_transform_entity_path=FIXED)
         tree.log_urdf_to_recording(recording)
+    if not any(tree.get_visual_geometry_paths(joint.child_link) for joint in tree.joints()):
+        _log_bones(recording, tree.joints())
     root = tree.root_link().name
     T_base_root = kinematics_of(arm).frame_pose(np.zeros(arm.dof), root)
     recording.log(
@@ -79,7 +83,7 @@ def drawable_urdf(path: Path) -> str:
         for shape in collisions or []:
             shape.tag = "visual"
             material = ET.SubElement(shape, "material", name="arm")
-            ET.SubElement(material, "color", rgba=COLOUR)
+            ET.SubElement(material, "color", rgba=" ".join(map(str, COLOUR)))
             link.append(shape)
     for mesh in robot.iter("mesh"):
         mesh.set("filename", str(_mesh(mesh.get("filename", ""), path)))
@@ -100,6 +104,13 @@ def _mesh(name: str, urdf: Path) -> Path:
         if candidate.is_file():
             return candidate
     raise ArmError(f"{urdf.name} names the mesh {name}, which is not to be found. Set ROS_PACKAGE_PATH to its package.")
+
+
+def _log_bones(recording: rr.RecordingStream, joints: Sequence[UrdfJoint]) -> None:
+    """Draw a line from each link's origin to the next ones'."""
+    for joint in joints:
+        line = rr.LineStrips3D([[(0.0, 0.0, 0.0), joint.origin_xyz]], radii=[BONE_RADIUS], colors=[COLOUR])
+        recording.log(f"{BONES}/{joint.name}", line, rr.CoordinateFrame(joint.parent_link), static=True)
 
 
 def _beyond(joints: Sequence[UrdfJoint], last: UrdfJoint) -> list[UrdfJoint]:

@@ -13,7 +13,7 @@ TIME, FRAME = "time", "frame"
 TITLES = {JOINTS: "Joints", END_EFFECTOR: "End effector", REDUNDANCY: "Redundancy", ACTION: "Action"}
 MAX_COLUMNS = 3
 # Seen from the front right, above the table.
-EYE, TARGET = (1.7, -1.5, 1.5), (0.3, 0.0, 0.45)  # [m] in the arm's base frame
+EYE, TARGET = (1.4, -1.4, 1.3), (0.3, 0.0, 0.4)  # [m] in the arm's base frame
 
 
 def blueprint(curves: Sequence[Curve], cameras: Sequence[str]) -> rrb.Blueprint:
@@ -46,7 +46,12 @@ def _grid(group: str, curves: Sequence[Curve]) -> rrb.Grid | None:
     if not curves:
         return None
     plots = [
-        rrb.TimeSeriesView(origin=f"/{curve.path}", name=f"{curve.name} [{curve.unit}]" if curve.unit else curve.name)
+        rrb.TimeSeriesView(
+            origin=f"/{curve.path}",
+            name=f"{curve.name} [{curve.unit}]" if curve.unit else curve.name,
+            # The colours mean the same in every plot, and a legend hides the curve below it.
+            plot_legend=rrb.PlotLegend(visible=curve is curves[0]),
+        )
         for curve in curves
     ]
     return rrb.Grid(
