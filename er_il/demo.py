@@ -107,7 +107,8 @@ class Demo:
         if self.demonstrations is not None:
             recipe = recipe.resized(self.demonstrations)
         generate(recipe, self.spaces, self.out / "datasets" / self.task, progress, workers)
-        with worker_pool(workers, _one_thread) as pool:
+        # All trainings at once, be they more than the cores: in turns, a core would idle beside the last.
+        with worker_pool(max(workers, len(self.spaces)), _one_thread) as pool:
             _Schedule(self, pool, progress).run()
             cells = [self._cell(name) for name in self.decoders]
             policies = {name: self.training(decoder(name).space).policy for name in self.decoders}

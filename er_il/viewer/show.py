@@ -1,7 +1,9 @@
 """Where a recording goes: a file, a viewer on this screen, or a browser anywhere."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
+from urllib.parse import quote
 
 import rerun as rr
 
@@ -25,18 +27,23 @@ def save_recording(trace: Trace, shapes: Sequence[Shape], path: Path) -> None:
     """Write an episode as a file for Rerun; the file is whole or absent.
 
     Raises:
-        ErIlError: the path does not end in ``.rrd``, or the disk is full.
-        OSError: the file cannot be written.
+        ErIlError: the path does not end in ``.rrd``, or the file cannot be written.
     """
     if path.suffix != SUFFIX:
         raise ErIlError(f"Rerun knows its files by {SUFFIX}; {path} ends in {path.suffix or 'nothing'}.")
     view = view_of(trace, shapes)
-    path.parent.mkdir(parents=True, exist_ok=True)
+    # Not by Rerun's own save: on a full disk that one waits for ever.
+    memory = view.recording.memory_recording()
+    view.recording.send_blueprint(view.layout)
     partial = path.with_name(path.name + ".partial")
-    partial.touch()  # Rerun's own error names no reason
-    view.recording.save(partial, default_blueprint=view.layout)
-    view.recording.disconnect()  # writes what is left
-    partial.rename(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        partial.write_bytes(memory.drain_as_bytes())
+        partial.rename(path)
+    except OSError as error:
+        with suppress(OSError):
+            partial.unlink(missing_ok=True)
+        raise ErIlError(f"Cannot write {path}: {error.strerror}.") from error
 
 
 def require_display() -> None:
@@ -62,4 +69,4 @@ def serve(view: View) -> str:
     """Serve the recording and a viewer for browsers until this process ends; return the address."""
     uri = view.recording.serve_grpc(grpc_port=GRPC_PORT, default_blueprint=view.layout)
     rr.serve_web_viewer(web_port=WEB_PORT, open_browser=has_display(), connect_to=uri)
-    return f"http://localhost:{WEB_PORT}?url={uri}"
+    return f"http://localhost:{WEB_PORT}?url={quote(uri)}"
