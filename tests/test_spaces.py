@@ -7,6 +7,7 @@ from chains import chain_arm, write_chain
 from er_il import ActionSpace, Arm, ArmAngleFrames, Status, from_spec, make_action_space
 from er_il.errors import ArmError, ShapeError, SpecError, UnknownNameError
 from er_il.round_trip import EXACT, SINGULAR, RoundTrip, round_trips
+from er_il.spaces.task import POSTURE_PULL
 
 PANDA = Arm.preset("panda")
 
@@ -288,3 +289,20 @@ def test_rotations_are_continuous_along_a_demo_through_half_a_turn():
     np.testing.assert_allclose(
         [space.decode(a, row).q for a, row in zip(space.encode(q), q, strict=True)], q, atol=EXACT
     )
+
+
+def test_posture_pulls_step_by_step_and_arrives():
+    """The null space moves by no more than the declared pull a decode, and ends where the posture wants it."""
+    pulled, nearest = (make_action_space("task", PANDA, posture=posture) for posture in (PANDA.home, None))
+    q = np.array([1.25, -1.01, -0.32, -1.86, -1.18, 1.85, 1.44])
+    action = pulled.encode(q)
+    steps = []
+    for _ in range(60):
+        decoded = pulled.decode(action, q)
+        assert decoded.status is Status.OK
+        steps.append(np.max(np.abs(decoded.q - q)))
+        q = decoded.q
+    assert max(steps) < 2 * POSTURE_PULL
+    assert steps[-1] < 1e-3
+    assert np.linalg.norm(q - PANDA.home) < np.linalg.norm(nearest.decode(action, q).q - PANDA.home) + 1e-3
+    assert abs(q[0]) < 0.2  # home's elbow points up
