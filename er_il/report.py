@@ -74,10 +74,8 @@ def write_page(folder: Path, title: str, introduction: str, pictures: Mapping[st
     report = json.loads((folder / REPORT).read_text())
     cells, meta = report["cells"], report["meta"]
     write_chart(cells, folder / CHART)
-    shown = [
-        f"![{caption}]({name})\n\n*{caption}*" if name.endswith(".png") else f"- [{caption}]({name})"
-        for caption, name in pictures.items()
-    ]
+    shown = [f"![{caption}]({name})\n\n*{caption}*" for caption, name in pictures.items() if name.endswith(".png")]
+    links = [f"- [{caption}]({name})" for caption, name in pictures.items() if not name.endswith(".png")]
     versions = ", ".join(f"{name} {version}" for name, version in meta["versions"].items())
     settings = [
         f"- {key.replace('_', ' ')}: {value}"
@@ -90,6 +88,7 @@ def write_page(folder: Path, title: str, introduction: str, pictures: Mapping[st
         success_table(cells),
         f"![Success of each decoder]({CHART})",
         *shown,
+        "\n".join(links),
         "## How it was made",
         "\n".join(
             [

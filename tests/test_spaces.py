@@ -297,7 +297,7 @@ def test_posture_pulls_step_by_step_and_arrives():
     q = np.array([1.25, -1.01, -0.32, -1.86, -1.18, 1.85, 1.44])
     action = pulled.encode(q)
     steps = []
-    for _ in range(60):
+    for _ in range(150):
         decoded = pulled.decode(action, q)
         assert decoded.status is Status.OK
         steps.append(np.max(np.abs(decoded.q - q)))
