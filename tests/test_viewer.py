@@ -1,11 +1,16 @@
 """Recordings of episodes, written as files and read back: what they show is what the data say."""
 
 import io
+import re
+import resource
+import signal
 import subprocess
 import sys
+import urllib.request
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
 import pytest
@@ -17,7 +22,7 @@ from scipy.spatial.transform import Rotation
 
 from er_il import Arm, make_action_space
 from er_il.cli import USER_MISTAKE, main
-from er_il.errors import ArmError
+from er_il.errors import ArmError, ErIlError
 from er_il.kinematics import kinematics_of
 from er_il.portable import arm_spec
 from er_il.recipe import Recipe
@@ -211,6 +216,35 @@ def test_a_rollout_is_shown_with_its_statuses(
     about = recorded["/about", "TextDocument:text"][0]
     for text in (TASK, "erj", "collision", str(shown.columns[DEMO_SEED][0].item()), f"2 of {len(status)}"):
         assert text in about
+
+
+def test_a_full_disk_is_an_error_that_leaves_nothing(shown: SimpleNamespace, tmp_path: Path) -> None:
+    path, limits = tmp_path / "episode.rrd", resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, limits[1]))
+    try:
+        with pytest.raises(ErIlError, match=r"Cannot write .*episode\.rrd: File too large"):
+            save_recording(*read_source(shown.root, EPISODE), path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        signal.signal(signal.SIGXFSZ, handler)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_served_episode_reaches_the_browser(shown: SimpleNamespace, tmp_path: Path) -> None:
+    read_source(shown.root, EPISODE)[0].save(tmp_path / "trace.npz")
+    # Its own process: on Ctrl-C it must end, and by itself it must not.
+    command = [sys.executable, "-c", "from er_il.cli import main; main()", "view", str(tmp_path / "trace.npz")]
+    with subprocess.Popen([*command, "--serve"], stdout=subprocess.PIPE, text=True) as server:
+        try:
+            assert server.stdout is not None
+            address = urlsplit(server.stdout.readline().strip())
+            with urllib.request.urlopen(f"http://{address.netloc}/") as page:
+                assert b"rerun" in page.read().lower()
+            assert re.fullmatch(r"rerun\+http://127\.0\.0\.1:\d+/proxy", parse_qs(address.query)["url"][0])
+        finally:
+            server.send_signal(signal.SIGINT)
+        assert server.wait() == 0
 
 
 @pytest.mark.parametrize(

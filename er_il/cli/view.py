@@ -27,11 +27,11 @@ def view(
         serve: Serve a viewer for browsers.
     """
     import time
+    from contextlib import suppress
 
     from rich.console import Console
 
     from er_il.viewer import show
-    from er_il.viewer.recording import view_of
     from er_il.viewer.source import read_source
 
     console = Console()
@@ -45,12 +45,9 @@ def view(
         show.save_recording(trace, shapes, save)
         console.print(str(save), highlight=False, soft_wrap=True)
     if spawn:
-        show.spawn(view_of(trace, shapes))
+        show.spawn(trace, shapes)
     if serve:
-        shown = view_of(trace, shapes)
-        console.print(f"{show.serve(shown)}\nCtrl-C ends it.", highlight=False, soft_wrap=True)
-        try:
+        with suppress(KeyboardInterrupt), show.served(trace, shapes) as address:
+            console.print(f"{address}\nCtrl-C ends it.", highlight=False, soft_wrap=True)
             while True:
                 time.sleep(1)
-        except KeyboardInterrupt:
-            return

@@ -1,6 +1,5 @@
 """An episode in Rerun: the arm in its world, what it was told and what it did."""
 
-from er_il.viewer.recording import View, view_of
 from er_il.viewer.show import save_recording, save_rollout
 
-__all__ = ["View", "save_recording", "save_rollout", "view_of"]
+__all__ = ["save_recording", "save_rollout"]

@@ -1,11 +1,9 @@
 """The recording of an episode, put together from its parts."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import rerun as rr
-import rerun.blueprint as rrb
 
 from er_il.kinematics import Status
 from er_il.portable import arm_from_spec
@@ -20,18 +18,20 @@ from er_il.viewer.world import log_cameras, log_scene
 APPLICATION = "er_il"
 
 
-@dataclass(frozen=True)
-class View:
-    """A recording that waits for a sink (a file, a viewer), and how to lay it out."""
+def open_recording(trace: Trace) -> rr.RecordingStream:
+    """Make the recording of an episode. Give it a sink (a file, a viewer) first, then log.
 
-    recording: rr.RecordingStream
-    layout: rrb.Blueprint
+    Rerun's server waits for ever for a recording that was logged before.
+    """
+    # Nothing is logged with the clock: the only times are the episode's own.
+    return rr.RecordingStream(APPLICATION, recording_id=_name(trace), send_properties=False)
 
 
-def view_of(trace: Trace, shapes: Sequence[Shape] = ()) -> View:
-    """Record an episode; equal episodes give equal recordings.
+def log_episode(recording: rr.RecordingStream, trace: Trace, shapes: Sequence[Shape] = ()) -> None:
+    """Log an episode and how to lay it out; equal episodes give equal recordings.
 
     Args:
+        recording: See :func:`open_recording`.
         trace: The episode.
         shapes: The world around the arm.
 
@@ -41,8 +41,7 @@ def view_of(trace: Trace, shapes: Sequence[Shape] = ()) -> View:
     """
     space = from_spec(trace.spec, arm_from_spec(trace.spec["arm"]))
     curves = curves_of(trace, space)
-    # Nothing is logged with the clock: the only times are the episode's own.
-    recording = rr.RecordingStream(APPLICATION, recording_id=_name(trace), send_properties=False)
+    recording.send_blueprint(blueprint(curves, list(trace.images)))
     times = [rr.TimeColumn(FRAME, sequence=np.arange(len(trace))), rr.TimeColumn(TIME, duration=trace.times)]
     log_arm(recording, times, space.arm, trace.q, trace.gripper)
     log_scene(recording, times, trace, shapes)
@@ -51,7 +50,6 @@ def view_of(trace: Trace, shapes: Sequence[Shape] = ()) -> View:
     log_curves(recording, times, curves)
     log_status(recording, times, trace)
     recording.log(ABOUT, rr.TextDocument(_about(trace), media_type=rr.MediaType.MARKDOWN), static=True)
-    return View(recording, blueprint(curves, list(trace.images)))
 
 
 def _name(trace: Trace) -> str:

@@ -1,7 +1,8 @@
 """Where a recording goes: a file, a viewer on this screen, or a browser anywhere."""
 
-from collections.abc import Sequence
-from contextlib import suppress
+import socket
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from urllib.parse import quote
 
@@ -11,7 +12,7 @@ from er_il.display import has_display
 from er_il.errors import ErIlError
 from er_il.scene import Shape
 from er_il.trace import Trace
-from er_il.viewer.recording import View, view_of
+from er_il.viewer.recording import log_episode, open_recording
 from er_il.viewer.source import shapes_of
 
 SUFFIX = ".rrd"  # by which Rerun knows its files
@@ -31,10 +32,9 @@ def save_recording(trace: Trace, shapes: Sequence[Shape], path: Path) -> None:
     """
     if path.suffix != SUFFIX:
         raise ErIlError(f"Rerun knows its files by {SUFFIX}; {path} ends in {path.suffix or 'nothing'}.")
-    view = view_of(trace, shapes)
-    # Not by Rerun's own save: on a full disk that one waits for ever.
-    memory = view.recording.memory_recording()
-    view.recording.send_blueprint(view.layout)
+    recording = open_recording(trace)
+    memory = recording.memory_recording()  # Rerun's own way to a file waits for ever if the disk is full
+    log_episode(recording, trace, shapes)
     partial = path.with_name(path.name + ".partial")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -59,14 +59,34 @@ def require_display() -> None:
         )
 
 
-def spawn(view: View) -> None:
+def spawn(trace: Trace, shapes: Sequence[Shape]) -> None:
     """Open the viewer on this screen; it stays open when this process ends."""
-    view.recording.spawn(default_blueprint=view.layout)
-    view.recording.flush()
+    recording = open_recording(trace)
+    recording.spawn()
+    log_episode(recording, trace, shapes)
+    recording.flush()
 
 
-def serve(view: View) -> str:
-    """Serve the recording and a viewer for browsers until this process ends; return the address."""
-    uri = view.recording.serve_grpc(grpc_port=GRPC_PORT, default_blueprint=view.layout)
-    rr.serve_web_viewer(web_port=WEB_PORT, open_browser=has_display(), connect_to=uri)
-    return f"http://localhost:{WEB_PORT}?url={quote(uri)}"
+@contextmanager
+def served(trace: Trace, shapes: Sequence[Shape]) -> Iterator[str]:
+    """Serve an episode and a viewer for browsers inside the block; yield the address."""
+    recording = open_recording(trace)
+    uri = recording.serve_grpc(grpc_port=_free(GRPC_PORT))
+    port = _free(WEB_PORT)
+    rr.serve_web_viewer(web_port=port, open_browser=has_display(), connect_to=uri)
+    log_episode(recording, trace, shapes)
+    try:
+        yield f"http://localhost:{port}?url={quote(uri)}"
+    finally:
+        recording.disconnect()
+
+
+def _free(port: int) -> int:
+    """That port, or another one if something listens there."""
+    with socket.socket() as candidate:
+        candidate.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            candidate.bind(("", port))
+        except OSError:
+            candidate.bind(("", 0))
+        return candidate.getsockname()[1]
