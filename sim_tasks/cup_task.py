@@ -31,8 +31,8 @@ class CupTask(ArmTask):
     cup = Goblet()
     surface: float  # z [m] on which the cup stands
     centre: tuple[float, float]  # x, y [m] of the cup's mean place
-    # The way of the leader's hand: offset [m] from the grasp, and base joint [rad] that puts the elbow there.
-    way: tuple[tuple[tuple[float, float, float], float], ...]
+    # The way of the leader's hand: offset [m] from the grasp, and base joint [rad] that puts the elbow there (or any).
+    way: tuple[tuple[tuple[float, float, float], float | None], ...]
 
     def __init__(
         self,

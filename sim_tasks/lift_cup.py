@@ -18,9 +18,9 @@ class LiftCup(CupTask):
     centre = stand.centre
     start = (0.0, -0.83, 0.0, -1.95, 0.0, 2.34, 0.785)  # above and in front of the stand, the elbow up
     way = (
-        ((-0.20, 0.0, 0.04), 0.1),
-        ((-0.10, 0.0, 0.01), 0.1),
-        ((0.0, 0.0, 0.0), 0.1),
+        ((-0.20, 0.0, 0.04), None),
+        ((-0.10, 0.0, 0.01), None),
+        ((0.0, 0.0, 0.0), None),
     )
 
     def _build(self, spec: mujoco.MjSpec) -> None:

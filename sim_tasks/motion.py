@@ -23,7 +23,7 @@ class Keyframe:
     """A pose for the hand on the way, with the elbow that should take it there."""
 
     T_base_ee: np.ndarray  # (4, 4)
-    elbow: float  # [rad] wished angle of the arm's first redundant joint
+    elbow: float | None  # [rad] wished angle of the arm's first redundant joint; None: any that is near will do
     straight: bool = False  # the hand moves here on a straight line
 
 
@@ -60,16 +60,17 @@ def solve_keyframe(arm: Arm, keyframe: Keyframe, seed: Vector, is_free: Callable
     Raises:
         PlanError: no elbow within the search range is reachable and free.
     """
-    joint = arm.redundant[0]
-    for offset in ELBOW_SEARCH:
-        for elbow in {keyframe.elbow + offset, keyframe.elbow - offset}:
-            ik = kinematics_of(arm).solve(keyframe.T_base_ee, seed, fixed={joint: elbow})
-            if ik.status is Status.OK and is_free(ik.q):
-                return ik.q
+    if keyframe.elbow is None:
+        wishes: list[dict[str, float]] = [{}]
+    else:
+        offsets = [sign * offset for offset in ELBOW_SEARCH for sign in (1, -1)]
+        wishes = [{arm.redundant[0]: keyframe.elbow + offset} for offset in offsets]
+    for fixed in wishes:
+        ik = kinematics_of(arm).solve(keyframe.T_base_ee, seed, fixed=fixed)
+        if ik.status is Status.OK and is_free(ik.q):
+            return ik.q
     x, y, z = keyframe.T_base_ee[:3, 3]
-    raise PlanError(
-        f"No collision-free elbow near {keyframe.elbow:.2f} rad for the hand at ({x:.2f}, {y:.2f}, {z:.2f})."
-    )
+    raise PlanError(f"No collision-free elbow near {keyframe.elbow} rad for the hand at ({x:.2f}, {y:.2f}, {z:.2f}).")
 
 
 def plan_stretch(
@@ -93,7 +94,7 @@ def plan_stretch(
 
 
 def _straight(arm: Arm, start: Vector, goal: Vector, keyframe: Keyframe) -> list[Vector]:
-    """Waypoints after the start along a straight line of the hand, the elbow turning evenly."""
+    """Waypoints after the start along a straight line of the hand, a wished elbow turning evenly."""
     kinematics, joint = kinematics_of(arm), arm.redundant[0]
     T_start, T_goal = kinematics.fk(start), keyframe.T_base_ee
     steps = max(1, int(np.ceil(np.linalg.norm(T_goal[:3, 3] - T_start[:3, 3]) / STRAIGHT_STEP)))
@@ -104,8 +105,8 @@ def _straight(arm: Arm, start: Vector, goal: Vector, keyframe: Keyframe) -> list
         T = np.eye(4)
         T[:3, :3] = turn(t).as_matrix()
         T[:3, 3] = (1 - t) * T_start[:3, 3] + t * T_goal[:3, 3]
-        angle = (1 - t) * start[elbow] + t * goal[elbow]
-        ik = kinematics.solve(T, waypoints[-1], fixed={joint: angle})
+        fixed = {} if keyframe.elbow is None else {joint: (1 - t) * start[elbow] + t * goal[elbow]}
+        ik = kinematics.solve(T, waypoints[-1], fixed=fixed)
         if ik.status is not Status.OK:
             raise PlanError("The hand cannot follow the straight line to a keyframe.")
         waypoints.append(ik.q)
