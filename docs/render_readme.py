@@ -8,7 +8,7 @@ import json
 import re
 from pathlib import Path
 
-from er_il.report import REPORT, success_table
+from er_il.showcase.report import REPORT, success_table
 
 ROOT = Path(__file__).resolve().parents[1]
 README = ROOT / "README.md"

@@ -5,11 +5,11 @@ import pytest
 from lerobot.policies.act.configuration_act import ACTConfig
 
 from er_il import Arm, make_action_space
-from er_il.contract import Contract, check_policy, policy_contract
+from er_il.data.layout import Layout
+from er_il.data.schema import action_feature
 from er_il.errors import PolicyError
-from er_il.layout import Layout
+from er_il.policy.contract import Contract, check_policy, policy_contract
 from er_il.resources import data_dir
-from er_il.schema import action_feature
 from er_il.spaces import ActionSpace
 
 PANDA = Arm.preset("panda")

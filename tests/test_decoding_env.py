@@ -3,9 +3,9 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from er_il.decoders import DECODERS, Decoder, decoder
-from er_il.decoding_env import make_decoding_env
 from er_il.errors import UnknownNameError
+from er_il.policy.decoders import DECODERS, Decoder, decoder
+from er_il.policy.decoding_env import make_decoding_env
 from er_il.tasks import task_id, task_names
 
 REACH = task_id("reach_cup")

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 from rich.progress import Progress
 
-from er_il.demo import Demo
 from er_il.errors import ErIlError, UnknownNameError
+from er_il.showcase.demo import Demo
 
 
 def small(out: Path, **kwargs: object) -> Demo:

@@ -7,10 +7,10 @@ import pytest
 from lerobot.datasets import LeRobotDataset
 
 from er_il.arm import Arm
-from er_il.encoding import encode_dataset
+from er_il.data.encoding import encode_dataset
+from er_il.data.layout import Layout
+from er_il.data.schema import ACTION, LEADER_JOINTS, action_feature
 from er_il.errors import DatasetError
-from er_il.layout import Layout
-from er_il.schema import ACTION, LEADER_JOINTS, action_feature
 from er_il.spaces import make_action_space
 
 PANDA = Arm.preset("panda")

@@ -13,11 +13,11 @@ from lerobot.policies.act.configuration_act import ACTConfig
 from lerobot.policies.act.modeling_act import ACTPolicy
 
 from er_il import Arm, make_action_space
-from er_il.contract import Contract
 from er_il.errors import ErIlError, PolicyError, UnknownNameError
-from er_il.evaluation import Cell, Episode, evaluate
-from er_il.results import load_cell, save_cell, write_cells
-from er_il.rollout import record_rollout
+from er_il.policy.contract import Contract
+from er_il.policy.evaluation import Cell, Episode, evaluate
+from er_il.policy.results import load_cell, save_cell, write_cells
+from er_il.policy.rollout import record_rollout
 
 PANDA = Arm.preset("panda")
 

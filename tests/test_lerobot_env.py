@@ -9,7 +9,7 @@ from lerobot.envs.utils import NEW_ROLLOUT_OPTION
 from lerobot.utils.import_utils import register_third_party_plugins
 
 from er_il.errors import UnknownNameError
-from er_il.lerobot_env import ErIlEnvConfig
+from er_il.policy.lerobot_env import ErIlEnvConfig
 
 
 def test_lerobot_finds_the_environment_by_the_distributions_name():

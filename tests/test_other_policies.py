@@ -10,12 +10,12 @@ from lerobot.policies.diffusion.modeling_diffusion import DiffusionPolicy
 from lerobot.scripts import lerobot_eval, lerobot_train
 from rich.progress import Progress
 
-from er_il.contract import policy_contract
-from er_il.evaluation import evaluate
-from er_il.recipe import Recipe
-from er_il.recording import generate
+from er_il.data.recipe import Recipe
+from er_il.data.recording import generate
+from er_il.policy.contract import policy_contract
+from er_il.policy.evaluation import evaluate
+from er_il.policy.training import Training
 from er_il.resources import data_dir
-from er_il.training import Training
 
 
 def run(main: object, *arguments: str) -> None:

@@ -25,10 +25,10 @@ from lerobot.scripts import lerobot_record
 from lerobot.utils.import_utils import register_third_party_plugins
 
 from er_il import Arm, make_action_space
+from er_il.data.layout import Layout, Part
+from er_il.data.motors import Motors
 from er_il.errors import ErIlError, ShapeError
-from er_il.layout import Layout, Part
-from er_il.motors import Motors
-from er_il.processors import DecodePolicyAction, DecodeRobotAction
+from er_il.robot.processors import DecodePolicyAction, DecodeRobotAction
 
 PANDA = Arm.preset("panda")
 JOINTS = tuple(f"{joint}.pos" for joint in PANDA.joints)

@@ -5,8 +5,8 @@ import gymnasium
 import numpy as np
 import pytest
 
+from er_il.data.recipe import DEMO_SEED_BASE, Recipe, recipe_names
 from er_il.errors import DatasetError, UnknownNameError
-from er_il.recipe import DEMO_SEED_BASE, Recipe, recipe_names
 from er_il.tasks import task_id, task_names
 
 FIRST_EVALUATION_SEED = 1000  # LeRobot's

@@ -11,12 +11,12 @@ import pytest
 from lerobot.datasets import LeRobotDataset
 from rich.progress import Progress
 
-from er_il.demos import Demo, make_world, record_demo
+from er_il.data.demos import Demo, make_world, record_demo
+from er_il.data.recipe import Recipe
+from er_il.data.record import Record
+from er_il.data.recording import generate
+from er_il.data.schema import ACTION, DEMO_SEED, LEADER_JOINTS, action_spec
 from er_il.errors import DatasetError, UnknownNameError
-from er_il.recipe import Recipe
-from er_il.record import Record
-from er_il.recording import generate
-from er_il.schema import ACTION, DEMO_SEED, LEADER_JOINTS, action_spec
 from er_il.spaces import from_spec
 
 RECIPE = Recipe.load("lift_cup").resized(3)

@@ -11,12 +11,13 @@ from foreign import ARMS, LEFT_JOINTS, LENGTHS, NAMES, bimanual, write_bimanual
 from lerobot.datasets import LeRobotDataset, dataset_metadata
 from lerobot.scripts import lerobot_edit_dataset, lerobot_train
 
-from er_il import Arm, decoding, encoding
+from er_il import Arm
+from er_il.data import decoding, encoding
 from er_il.cli import USER_MISTAKE, main
-from er_il.encoding import dataset_info, dataset_layout
-from er_il.hub import find_dataset
-from er_il.rewriting import read_vectors
-from er_il.schema import ACTION, SOURCE_ACTION, STATE
+from er_il.data.encoding import dataset_info, dataset_layout
+from er_il.data.hub import find_dataset
+from er_il.data.rewriting import read_vectors
+from er_il.data.schema import ACTION, SOURCE_ACTION, STATE
 
 RECORDED = np.concatenate([np.stack([each[name] for name in NAMES], axis=1) for each in bimanual()])
 

@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 from rich.progress import Progress
 
-from er_il.decoders import decoder
-from er_il.decoding_env import make_decoding_env
+from er_il.data.recipe import Recipe
+from er_il.data.record import read_episodes, read_spec
+from er_il.data.recording import generate
+from er_il.data.replay import find_datasets, replay, replay_demo, write_report
 from er_il.errors import DatasetError
-from er_il.recipe import Recipe
-from er_il.record import read_episodes, read_spec
-from er_il.recording import generate
-from er_il.replay import find_datasets, replay, replay_demo, write_report
+from er_il.policy.decoders import decoder
+from er_il.policy.decoding_env import make_decoding_env
 from er_il.tasks import task_id
 
 RECIPE = Recipe.load("reach_cup").resized(2)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from er_il.pictures import Row, moments, write_film, write_strip
-from er_il.report import CHART, success_table, write_page
+from er_il.showcase.pictures import Row, moments, write_film, write_strip
+from er_il.showcase.report import CHART, success_table, write_page
 
 CELLS = [
     {

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from er_il import Arm, make_action_space
+from er_il.data.layout import Layout, Part
+from er_il.data.motors import Motors
 from er_il.errors import ErIlError, ShapeError, UnknownNameError
-from er_il.layout import Layout, Part
-from er_il.motors import Motors
-from er_il.robot_commander import RobotCommander
+from er_il.robot.robot_commander import RobotCommander
 
 PANDA, XARM = Arm.preset("panda"), Arm.preset("xarm7")
 PERIOD = 0.05

@@ -18,12 +18,12 @@ from lerobot.teleoperators import TeleoperatorConfig, make_teleoperator_from_con
 from lerobot.utils.import_utils import register_third_party_plugins
 
 from er_il import cli
-from er_il.contract import check_policy
+from er_il.data.layout import Layout
+from er_il.data.schema import ACTION
 from er_il.errors import ErIlError, PolicyError, UnknownNameError
-from er_il.hardware import ScriptedLeader, ScriptedLeaderConfig, SimFollower, SimFollowerConfig
-from er_il.layout import Layout
-from er_il.lerobot_env import ErIlEnvConfig
-from er_il.schema import ACTION
+from er_il.policy.contract import check_policy
+from er_il.policy.lerobot_env import ErIlEnvConfig
+from er_il.robot.hardware import ScriptedLeader, ScriptedLeaderConfig, SimFollower, SimFollowerConfig
 from er_il.tasks import task_id
 
 SEED = 7

@@ -3,7 +3,7 @@ import pytest
 from scipy.stats import binom
 
 from er_il.errors import ErIlError
-from er_il.statistics import exact_interval, paired_difference
+from er_il.policy.statistics import exact_interval, paired_difference
 
 
 # The paper's cells with n = 10, as percentages.

@@ -7,11 +7,11 @@ from lerobot.scripts import lerobot_eval, lerobot_train
 from rich.progress import Progress
 
 from er_il import cli
+from er_il.data.recipe import Recipe
+from er_il.data.recording import generate
 from er_il.errors import DatasetError, PolicyError, UnknownNameError
-from er_il.evaluation import evaluate
-from er_il.recipe import Recipe
-from er_il.recording import generate
-from er_il.training import Training, default_config, pretrained
+from er_il.policy.evaluation import evaluate
+from er_il.policy.training import Training, default_config, pretrained
 
 RECIPE = Recipe.load("reach_cup").resized(3)
 

@@ -22,13 +22,13 @@ from scipy.spatial.transform import Rotation
 
 from er_il import Arm, make_action_space
 from er_il.cli import USER_MISTAKE, main
+from er_il.data.portable import arm_spec
+from er_il.data.recipe import Recipe
+from er_il.data.recording import generate
+from er_il.data.schema import ACTION, DEMO_SEED, ENVIRONMENT_STATE, STATE
 from er_il.errors import ArmError, ErIlError
 from er_il.kinematics import kinematics_of
-from er_il.portable import arm_spec
-from er_il.recipe import Recipe
-from er_il.recording import generate
 from er_il.scene import POSE_NAMES
-from er_il.schema import ACTION, DEMO_SEED, ENVIRONMENT_STATE, STATE
 from er_il.trace import Trace
 from er_il.viewer import save_recording
 from er_il.viewer.arm import drawable_urdf

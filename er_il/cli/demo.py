@@ -24,8 +24,8 @@ def demo(
 
     from er_il.cli.progress import make_progress
     from er_il.cli.table import results_table
-    from er_il.demo import TASK, Demo
-    from er_il.report import PAGE
+    from er_il.showcase.demo import TASK, Demo
+    from er_il.showcase.report import PAGE
     from er_il.workers import cores
 
     folder = out or Path("outputs") / ("demo" if task == TASK else task)

@@ -57,8 +57,8 @@ def encode(
     from rich.console import Console
 
     from er_il.cli.progress import make_progress
+    from er_il.data.wiring import Wiring, read_wirings
     from er_il.errors import DatasetError
-    from er_il.wiring import Wiring, read_wirings
 
     if arms is not None and arm:
         raise DatasetError("Give either --arm or --arms.")
@@ -81,7 +81,7 @@ def encode(
         ]
         wirings[0].build_arm()  # wrong options are told before seconds of imports
 
-    from er_il.reencoding import reencode
+    from er_il.data.reencoding import reencode
 
     console = Console()
     with make_progress(console) as progress:

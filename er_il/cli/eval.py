@@ -29,10 +29,10 @@ def eval(
     from rich.console import Console
 
     from er_il.cli.progress import make_progress
-    from er_il.evaluation import evaluate
+    from er_il.policy.evaluation import evaluate
+    from er_il.policy.results import write_cells
+    from er_il.policy.training import pretrained
     from er_il.provenance import provenance
-    from er_il.results import write_cells
-    from er_il.training import pretrained
 
     console = Console()
     with make_progress(console) as progress:

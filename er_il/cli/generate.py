@@ -34,7 +34,7 @@ def generate(
     from rich.console import Console
 
     from er_il.cli.progress import make_progress
-    from er_il.recipe import Recipe
+    from er_il.data.recipe import Recipe
     from er_il.workers import cores
 
     recipe = Recipe.load(task)
@@ -42,8 +42,8 @@ def generate(
         recipe = recipe.resized(episodes)
     given = {"seed": seed, "cameras": _split(cameras), "image_size": size}
     recipe = replace(recipe, **{key: value for key, value in given.items() if value is not None})
-    from er_il.demos import tally
-    from er_il.recording import generate as generate_datasets  # seconds of imports: wrong options are told before
+    from er_il.data.demos import tally
+    from er_il.data.recording import generate as generate_datasets  # seconds of imports: wrong options are told before
 
     folder = out if out is not None else Path("datasets") / task
     console = Console()

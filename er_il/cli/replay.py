@@ -16,10 +16,10 @@ def replay(datasets: Positional[tuple[str, ...]], *, out: Path = Path("outputs/r
     from rich.table import Table
 
     from er_il.cli.progress import make_progress
+    from er_il.data.replay import find_datasets, write_report
+    from er_il.data.replay import replay as replay_datasets
     from er_il.errors import DatasetError
     from er_il.provenance import provenance
-    from er_il.replay import find_datasets, write_report
-    from er_il.replay import replay as replay_datasets
     from er_il.workers import cores
 
     if not datasets:

@@ -32,9 +32,9 @@ def train(
     import sys
 
     from er_il.errors import UnknownNameError
+    from er_il.policy.training import Training, default_config, default_steps
     from er_il.spaces import SPACES
     from er_il.tasks import task_id
-    from er_il.training import Training, default_config, default_steps
 
     task_id(task)
     if space not in SPACES:

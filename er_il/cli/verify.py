@@ -34,11 +34,11 @@ def verify(dataset: Positional[str], *, out: Path | None = None) -> None:
     from rich.table import Table
 
     from er_il.cli.progress import make_progress
+    from er_il.data.hub import find_dataset
+    from er_il.data.verification import verify as verify_dataset
+    from er_il.data.verification_plot import plot
     from er_il.errors import DatasetError
-    from er_il.hub import find_dataset
     from er_il.provenance import provenance
-    from er_il.verification import verify as verify_dataset
-    from er_il.verification_plot import plot
     from er_il.workers import cores
 
     folder = find_dataset(dataset)

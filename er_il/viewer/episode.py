@@ -5,13 +5,13 @@ from pathlib import Path
 import numpy as np
 from lerobot.datasets.utils import DatasetInfo
 
-from er_il.decoding import decode_episode
-from er_il.encoding import dataset_info, dataset_layout, joints_column, read_episodes
+from er_il.data.decoding import decode_episode
+from er_il.data.encoding import dataset_info, dataset_layout, joints_column, read_episodes
+from er_il.data.layout import Layout, Part
+from er_il.data.portable import arm_spec
+from er_il.data.rewriting import episode_slices, read_episode_numbers, read_vectors
+from er_il.data.schema import DEMO_SEED, ENVIRONMENT_STATE, STATE, dimension_names
 from er_il.errors import DatasetError, UnknownNameError
-from er_il.layout import Layout, Part
-from er_il.portable import arm_spec
-from er_il.rewriting import episode_slices, read_episode_numbers, read_vectors
-from er_il.schema import DEMO_SEED, ENVIRONMENT_STATE, STATE, dimension_names
 from er_il.spaces import JointSpace
 from er_il.trace import Array, Trace
 from er_il.viewer.column import DATA, read_rows

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 import rerun as rr
 
+from er_il.data.portable import arm_from_spec
 from er_il.kinematics import Status
-from er_il.portable import arm_from_spec
 from er_il.scene import Shape
 from er_il.spaces import from_spec
 from er_il.trace import Trace

@@ -7,8 +7,8 @@ from typing import Any
 
 import gymnasium
 
+from er_il.data.record import RECORD, Record
 from er_il.errors import DatasetError
-from er_il.record import RECORD, Record
 from er_il.scene import Shape
 from er_il.tasks import task_id, task_names
 from er_il.trace import SUFFIX, Trace

@@ -1,0 +1,1 @@
+"""LeRobot datasets: recording, re-encoding, verifying and replaying them."""

@@ -1,0 +1,1 @@
+"""Trained policies: the contract with a rollout, training, rolling out and counting."""

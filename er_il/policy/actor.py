@@ -1,0 +1,100 @@
+"""A trained policy with its processors, and the environment it was trained for."""
+
+import io
+from collections.abc import Callable
+from contextlib import redirect_stdout
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from lerobot.configs import PreTrainedConfig
+from lerobot.envs import preprocess_observation
+from lerobot.policies import PreTrainedPolicy, make_policy, make_pre_post_processors
+from lerobot.utils.constants import OBS_IMAGES
+
+from er_il.command import BEST_EFFORT
+from er_il.errors import PolicyError
+from er_il.policy.contract import NONE, check_policy, policy_contract
+from er_il.policy.decoders import decoder
+from er_il.policy.lerobot_env import ErIlEnvConfig
+from er_il.rotation import Quaternion
+
+# Matrix products of another shape round differently, and contact amplifies the last bit into another
+# outcome. So the policy always sees this many rows, the missing ones filled up: then an episode's
+# outcome depends on its seed alone, not on how many run beside it.
+POLICY_ROWS = 25
+
+
+def environment_of(policy: Path, task: str, decoder_name: str, on_invalid: str = BEST_EFFORT) -> ErIlEnvConfig:
+    """Build the environment that a policy needs: its rotation code, its cameras."""
+    chosen = decoder(decoder_name)
+    contract = policy_contract(policy)
+    images = _load_config(policy).image_features
+    sizes = {feature.shape[-1] for feature in images.values()}
+    config = ErIlEnvConfig(
+        task=task,
+        action_space=chosen.space,
+        resolution=chosen.resolution,
+        rotation=Quaternion.kind if contract.rotation == NONE else contract.rotation,
+        on_invalid=on_invalid,
+        cameras=[key.removeprefix(f"{OBS_IMAGES}.") for key in images],
+        image_size=sizes.pop() if sizes else ErIlEnvConfig.image_size,
+    )
+    env = config.make()
+    check_policy(policy, env.space)
+    env.close()
+    return config
+
+
+def _load_config(policy: Path) -> PreTrainedConfig:
+    config = PreTrainedConfig.from_pretrained(policy)
+    config.pretrained_path = policy
+    if hasattr(config, "pretrained_backbone_weights"):
+        config.pretrained_backbone_weights = None  # pyright: ignore[reportAttributeAccessIssue]  the checkpoint has them
+    return config
+
+
+@dataclass(frozen=True)
+class Actor:
+    """A policy with its processors."""
+
+    policy: PreTrainedPolicy
+    preprocess: Callable[[dict[str, Any]], dict[str, Any]]
+    postprocess: Callable[[torch.Tensor], torch.Tensor]
+
+    @classmethod
+    def load(cls, path: Path, config: ErIlEnvConfig) -> "Actor":
+        policy_config = _load_config(path)
+        trained = policy_config.action_feature
+        if trained is None or trained.shape != config.features["action"].shape:
+            raise PolicyError(
+                f"The policy {path} does not act in {config.action_space} space: its actions differ in length."
+            )
+        with redirect_stdout(io.StringIO()):  # LeRobot announces every file it loads
+            policy = make_policy(policy_config, env_cfg=config)
+        policy.eval()
+        overrides = {"device_processor": {"device": str(policy.config.device)}}
+        preprocess, postprocess = make_pre_post_processors(
+            policy_config, pretrained_path=str(path), preprocessor_overrides=overrides
+        )
+        return cls(policy, preprocess, postprocess)
+
+    def reset(self, seed: int) -> None:
+        """Begin episodes. Some policies, such as Diffusion, draw random numbers: from ``seed`` on, the same ones."""
+        torch.manual_seed(seed)
+        self.policy.reset()
+
+    def act(self, observation: dict[str, Any], task: str) -> np.ndarray:
+        """Return an action (N, dim) a row of the observation, N up to ``POLICY_ROWS``."""
+        batch: dict[str, Any] = {key: _filled(rows) for key, rows in preprocess_observation(observation).items()}
+        batch["task"] = [task] * POLICY_ROWS
+        with torch.inference_mode():
+            action = self.postprocess(self.policy.select_action(self.preprocess(batch)))
+        return action.cpu().numpy()
+
+
+def _filled(rows: torch.Tensor) -> torch.Tensor:
+    """Repeat the last row up to ``POLICY_ROWS`` rows."""
+    return torch.cat([rows, rows[-1:].expand(POLICY_ROWS - len(rows), *rows.shape[1:])])

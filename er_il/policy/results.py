@@ -1,0 +1,61 @@
+"""Results on disk: a report as JSON and one row an episode as CSV, never half-written."""
+
+import csv
+import json
+from collections import Counter
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from er_il.policy.evaluation import Cell, Episode
+
+
+def write_cells(cells: Sequence[Cell], meta: dict[str, Any], folder: Path) -> None:
+    """Write ``report.json`` and one row an episode in ``episodes.csv``."""
+    folder.mkdir(parents=True, exist_ok=True)
+    report = {"meta": meta, "cells": [cell.report() for cell in cells]}
+    _write(folder / "report.json", lambda path: path.write_text(json.dumps(report, indent=2) + "\n"))
+    _write(folder / "episodes.csv", lambda path: _write_csv(cells, path))
+
+
+def save_cell(cell: Cell, path: Path) -> None:
+    """Write a cell with all its episodes, for :func:`load_cell`."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    data = vars(cell) | {"episodes": [vars(episode) for episode in cell.episodes]}
+    _write(path, lambda partial: partial.write_text(json.dumps(data)))
+
+
+def load_cell(path: Path) -> Cell:
+    """Read what :func:`save_cell` wrote."""
+    data = json.loads(path.read_text())
+    episodes = [
+        Episode(**episode | {"statuses": Counter(episode["statuses"]), "latencies": tuple(episode["latencies"])})
+        for episode in data["episodes"]
+    ]
+    return Cell(data["task"], data["decoder"], tuple(episodes))
+
+
+def _write_csv(cells: Sequence[Cell], path: Path) -> None:
+    with path.open("w", newline="") as file:
+        rows = csv.writer(file)
+        rows.writerow(["task", "decoder", "seed", "success", "failure", "steps", "invalid", "max_joint_step"])
+        for cell in cells:
+            for e in cell.episodes:
+                rows.writerow(
+                    [
+                        cell.task,
+                        cell.decoder,
+                        e.seed,
+                        int(e.success),
+                        e.failure,
+                        e.steps,
+                        e.invalid,
+                        f"{e.joint_step:.6f}",
+                    ]
+                )
+
+
+def _write(path: Path, write: Callable[[Path], object]) -> None:
+    partial = path.with_name(path.name + ".partial")
+    write(partial)
+    partial.rename(path)

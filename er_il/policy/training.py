@@ -1,0 +1,169 @@
+"""Training with LeRobot's own command: which one, and how far it has come."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO
+
+import yaml
+
+from er_il.data.recipe import TRAIN
+from er_il.data.schema import action_spec
+from er_il.errors import DatasetError, PolicyError, UnknownNameError
+from er_il.policy.contract import Contract, dataset_info
+from er_il.resources import data_dir
+from er_il.spaces import SPACES
+
+STOCK = "lerobot-train"
+# With two threads on two cores, a step of these small policies takes ten times as long as with one.
+ONE_THREAD = {"OMP_NUM_THREADS": "1"}
+_CHECKPOINTS, _LAST, _PRETRAINED = "checkpoints", "last", "pretrained_model"
+
+
+@dataclass(frozen=True)
+class Training:
+    """One policy to train: from a dataset, by a configuration, into a folder.
+
+    Raises:
+        DatasetError: the dataset is missing, or holds actions of another space.
+        UnknownNameError: no such action space.
+    """
+
+    task: str
+    space: str
+    dataset: Path
+    out: Path
+    config: Path
+    steps: int
+    seed: int
+
+    def __post_init__(self) -> None:
+        if self.space not in SPACES:
+            raise UnknownNameError("action space", self.space, SPACES)
+        if self.steps < 1:
+            raise PolicyError(f"{self.steps} training steps train nothing; ask for at least one.")
+        if not self.config.is_file():
+            raise PolicyError(f"There is no training configuration {self.config}.")
+        spec = action_spec(dataset_info(self.dataset)["features"])
+        if spec["space"] != self.space:
+            raise DatasetError(f"The dataset at {self.dataset} holds {spec['space']} actions, not {self.space}.")
+
+    @property
+    def command(self) -> list[str]:
+        """The stock command that starts the training, or goes on where it was interrupted."""
+        last = self._checkpoint
+        if last is not None:
+            return [STOCK, f"--config_path={last / _PRETRAINED / 'train_config.json'}", "--resume=true", *self._length]
+        info = dataset_info(self.dataset)
+        contract = Contract.of_spec(action_spec(info["features"]))
+        return [
+            STOCK,
+            f"--config_path={self.config}",
+            f"--dataset.repo_id=er_il/{self.task}_{self.space}",
+            f"--dataset.root={self.dataset}",
+            f"--dataset.episodes={json.dumps(_train_episodes(info), separators=(',', ':'))}",
+            f"--policy.tags={json.dumps([contract.tag])}",
+            f"--output_dir={self.out}",
+            f"--seed={self.seed}",
+            *self._length,
+        ]
+
+    @property
+    def done_steps(self) -> int:
+        """Number of steps that the last checkpoint has behind it."""
+        last = self._checkpoint
+        return 0 if last is None else json.loads((last / "training_state" / "training_step.json").read_text())["step"]
+
+    @property
+    def finished(self) -> bool:
+        """Whether all steps are done."""
+        return self.done_steps >= self.steps
+
+    @property
+    def policy(self) -> Path:
+        """Folder of the trained policy."""
+        return self.out / _CHECKPOINTS / _LAST / _PRETRAINED
+
+    def clear(self) -> None:
+        """Remove what an interruption before the first checkpoint left, which LeRobot would stumble over.
+
+        Raises:
+            PolicyError: the folder holds something else.
+        """
+        if self._checkpoint is not None or not self.out.exists():
+            return
+        if strangers := [path.name for path in self.out.iterdir() if path.name != _CHECKPOINTS]:
+            raise PolicyError(f"{self.out} holds {strangers[0]!r} but no training to resume; choose another --out.")
+        shutil.rmtree(self.out)
+
+    def run(self, output: IO[str] | None = None) -> int:
+        """Run the command, with one thread unless ``OMP_NUM_THREADS`` says otherwise; return its exit code.
+
+        Args:
+            output: Where what it prints goes; to this process's own output if omitted.
+
+        Raises:
+            PolicyError: the output folder holds something else.
+        """
+        self.clear()
+        command = [str(Path(sys.executable).parent / self.command[0]), *self.command[1:]]  # need not be on the PATH
+        environment = ONE_THREAD | os.environ
+        return subprocess.run(command, env=environment, stdout=output, stderr=output, check=False).returncode
+
+    @property
+    def _checkpoint(self) -> Path | None:
+        """The last complete checkpoint."""
+        folder = self.out / _CHECKPOINTS
+        if (folder / _LAST).exists():
+            return (folder / _LAST).resolve()
+        # LeRobot takes the link away for a moment to move it: what it pointed at is not the newest.
+        complete = sorted(folder.glob("[0-9]*"))[:-1]
+        return complete[-1] if complete else None
+
+    @property
+    def _length(self) -> list[str]:
+        return [f"--steps={self.steps}"]
+
+
+def default_config(space: str) -> Path:
+    """Return the configuration that ships for a space, state-based."""
+    return data_dir("configs") / f"act_{space}.yaml"
+
+
+def default_steps(config: Path) -> int:
+    """Return the number of steps that a configuration asks for.
+
+    Raises:
+        PolicyError: the configuration is missing or does not say.
+    """
+    try:
+        return int(yaml.safe_load(config.read_text())["steps"])
+    except (OSError, yaml.YAMLError, KeyError, TypeError, ValueError) as error:
+        raise PolicyError(f"There is no training configuration {config} that says how many steps to take.") from error
+
+
+def pretrained(path: Path) -> Path:
+    """Find the policy in a folder: a pretrained policy, or the output of a training.
+
+    Raises:
+        PolicyError: there is none.
+    """
+    for folder in (path, path / _CHECKPOINTS / _LAST / _PRETRAINED):
+        if (folder / "config.json").is_file():
+            return folder
+    raise PolicyError(f"No policy at {path}: neither it nor a checkpoint inside has a config.json.")
+
+
+def _train_episodes(info: dict[str, object]) -> list[int]:
+    """Read the training episodes off a dataset's splits, such as ``{"train": "0:32"}``."""
+    splits = info.get("splits")
+    try:
+        assert isinstance(splits, dict)
+        start, stop = splits[TRAIN].split(":")
+        return list(range(int(start), int(stop)))
+    except (AssertionError, KeyError, ValueError, AttributeError) as error:
+        raise DatasetError(f"The dataset names no {TRAIN} episodes in its splits: {splits}.") from error

@@ -1,0 +1,1 @@
+"""Policies and devices on LeRobot's robot commands."""

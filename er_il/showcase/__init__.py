@@ -1,0 +1,1 @@
+"""The main job in one call, and what a reader sees of results."""
