@@ -47,3 +47,7 @@ class PolicyError(ErIlError):
 
 class PlanError(ErIlError):
     """No collision-free motion exists for the scripted leader; the demo is dropped and counted."""
+
+
+class RenderError(ErIlError):
+    """The machine cannot render off screen."""

@@ -9,6 +9,16 @@ if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get(
 
 import gymnasium
 
+from er_il.errors import RenderError
+
+try:
+    import mujoco  # noqa: F401
+except (ImportError, AttributeError, RuntimeError) as error:  # each GL backend fails in its own way
+    raise RenderError(
+        f"MuJoCo does not start with MUJOCO_GL={os.environ.get('MUJOCO_GL', '')!r} ({error}). "
+        "Valid: egl, osmesa, glfw; `er-il doctor` says which of them this machine has."
+    ) from error
+
 from sim_tasks.arm_task import ArmTask
 from sim_tasks.lift_cup import LiftCup
 from sim_tasks.reach_cup import ReachCup

@@ -7,15 +7,11 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from er_il.errors import ErIlError, UnknownNameError
+from er_il.errors import ErIlError, RenderError, UnknownNameError
 
 LARGEST_PICTURE = 1024  # [px]
 PICTURE = (720, 960)  # [px] height and width of pictures for people
 UP = (0.0, 0.0, 1.0)
-
-
-class RenderError(ErIlError):
-    """The machine cannot render off screen."""
 
 
 @dataclass(frozen=True)

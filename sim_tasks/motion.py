@@ -23,7 +23,7 @@ class Keyframe:
     """A pose for the hand on the way, with the elbow that should take it there."""
 
     T_base_ee: np.ndarray  # (4, 4)
-    elbow: float | None  # [rad] wished angle of the arm's first redundant joint; None: any that is near will do
+    elbow: float | None  # [rad] wished angle of the arm's first redundant joint; None: that of the nearest posture
     straight: bool = False  # the hand moves here on a straight line
 
 
@@ -60,17 +60,19 @@ def solve_keyframe(arm: Arm, keyframe: Keyframe, seed: Vector, is_free: Callable
     Raises:
         PlanError: no elbow within the search range is reachable and free.
     """
-    if keyframe.elbow is None:
-        wishes: list[dict[str, float]] = [{}]
-    else:
-        offsets = [sign * offset for offset in ELBOW_SEARCH for sign in (1, -1)]
-        wishes = [{arm.redundant[0]: keyframe.elbow + offset} for offset in offsets]
-    for fixed in wishes:
-        ik = kinematics_of(arm).solve(keyframe.T_base_ee, seed, fixed=fixed)
+    joint = arm.redundant[0]
+    wish = keyframe.elbow
+    if wish is None:
+        nearest = kinematics_of(arm).solve(keyframe.T_base_ee, seed).q[arm.joints.index(joint)]
+        # Free joints differ in the last bits from process to process; a rounded wish leads all to the same plan.
+        wish = round(float(nearest), 4)
+    offsets = [sign * offset for offset in ELBOW_SEARCH for sign in (1, -1)]
+    for offset in offsets:
+        ik = kinematics_of(arm).solve(keyframe.T_base_ee, seed, fixed={joint: wish + offset})
         if ik.status is Status.OK and is_free(ik.q):
             return ik.q
     x, y, z = keyframe.T_base_ee[:3, 3]
-    raise PlanError(f"No collision-free elbow near {keyframe.elbow} rad for the hand at ({x:.2f}, {y:.2f}, {z:.2f}).")
+    raise PlanError(f"No collision-free elbow near {wish:.2f} rad for the hand at ({x:.2f}, {y:.2f}, {z:.2f}).")
 
 
 def plan_stretch(
@@ -94,7 +96,7 @@ def plan_stretch(
 
 
 def _straight(arm: Arm, start: Vector, goal: Vector, keyframe: Keyframe) -> list[Vector]:
-    """Waypoints after the start along a straight line of the hand, a wished elbow turning evenly."""
+    """Waypoints after the start along a straight line of the hand, the elbow turning evenly."""
     kinematics, joint = kinematics_of(arm), arm.redundant[0]
     T_start, T_goal = kinematics.fk(start), keyframe.T_base_ee
     steps = max(1, int(np.ceil(np.linalg.norm(T_goal[:3, 3] - T_start[:3, 3]) / STRAIGHT_STEP)))
@@ -105,8 +107,8 @@ def _straight(arm: Arm, start: Vector, goal: Vector, keyframe: Keyframe) -> list
         T = np.eye(4)
         T[:3, :3] = turn(t).as_matrix()
         T[:3, 3] = (1 - t) * T_start[:3, 3] + t * T_goal[:3, 3]
-        fixed = {} if keyframe.elbow is None else {joint: (1 - t) * start[elbow] + t * goal[elbow]}
-        ik = kinematics.solve(T, waypoints[-1], fixed=fixed)
+        angle = (1 - t) * start[elbow] + t * goal[elbow]
+        ik = kinematics.solve(T, waypoints[-1], fixed={joint: angle})
         if ik.status is not Status.OK:
             raise PlanError("The hand cannot follow the straight line to a keyframe.")
         waypoints.append(ik.q)

@@ -12,8 +12,8 @@ from lerobot.datasets import LeRobotDataset, dataset_metadata
 from lerobot.scripts import lerobot_edit_dataset, lerobot_train
 
 from er_il import Arm
-from er_il.data import decoding, encoding
 from er_il.cli import USER_MISTAKE, main
+from er_il.data import decoding, encoding
 from er_il.data.encoding import dataset_info, dataset_layout
 from er_il.data.hub import find_dataset
 from er_il.data.rewriting import read_vectors

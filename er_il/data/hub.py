@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import httpx
 from lerobot.datasets import LeRobotDataset
 
 from er_il.errors import DatasetError
@@ -21,6 +22,7 @@ def find_dataset(source: str) -> Path:
         return folder  # whoever reads it says what is wrong with it
     try:
         return Path(LeRobotDataset(source, video_backend="pyav").root)
-    except (OSError, ValueError, NotImplementedError) as error:  # huggingface_hub's errors derive from these
+    # huggingface_hub's own errors are OSErrors and ValueErrors; without a network, its client's come through.
+    except (OSError, ValueError, NotImplementedError, httpx.HTTPError) as error:
         reason = (str(error).strip() or type(error).__name__).splitlines()[0]
         raise DatasetError(f"{source} is neither a folder nor a dataset that LeRobot can load: {reason}") from error
