@@ -16,10 +16,9 @@ import numpy as np
 from er_il.data.recipe import Recipe
 from er_il.data.record import Record, Recorded, read_episodes, read_spec
 from er_il.errors import DatasetError
-from er_il.kinematics import Status
 from er_il.policy.decoders import DECODERS, decoder
 from er_il.policy.decoding_env import DecodingEnv, make_decoding_env
-from er_il.policy.statistics import exact_interval
+from er_il.policy.outcomes import summarise
 from er_il.rotation import Quaternion
 from er_il.spaces import from_spec
 from er_il.tasks import task_id
@@ -56,18 +55,8 @@ class ReplayCell:
 
     def report(self) -> dict[str, Any]:
         """Return the cell as JSON."""
-        statuses = sum((demo.statuses for demo in self.demos), Counter[str]())
-        return {
-            "task": self.task,
-            "decoder": self.decoder,
-            "successes": self.successes,
-            "episodes": len(self.demos),
-            "interval": list(exact_interval(self.successes, len(self.demos))),
-            "failures": dict(Counter(demo.failure for demo in self.demos if not demo.success).most_common()),
-            "statuses": dict(statuses.most_common()),
-            "invalid_rate": 1 - statuses[Status.OK] / statuses.total(),
+        return summarise(self.task, self.decoder, self.demos) | {
             "max_joint_deviation": max(demo.deviation for demo in self.demos),
-            "max_joint_step": max(demo.joint_step for demo in self.demos),
             "demos": [
                 {"seed": demo.seed, "success": demo.success, "failure": demo.failure, "max_deviation": demo.deviation}
                 for demo in self.demos

@@ -15,7 +15,7 @@ from er_il.command import BEST_EFFORT
 from er_il.errors import ErIlError
 from er_il.kinematics import Status
 from er_il.policy.actor import POLICY_ROWS, Actor, environment_of
-from er_il.policy.statistics import exact_interval
+from er_il.policy.outcomes import summarise
 
 FIRST_SEED = 1000  # LeRobot's own; demonstrations use seeds from a million up
 TIMEOUT = "timeout"
@@ -56,27 +56,12 @@ class Cell:
         """Number of successful episodes."""
         return sum(episode.success for episode in self.episodes)
 
-    @property
-    def failures(self) -> Counter[str]:
-        """How often each failure occurred."""
-        return Counter(episode.failure for episode in self.episodes if not episode.success)
-
     def report(self) -> dict[str, Any]:
         """Return the cell as JSON."""
         latencies = np.concatenate([episode.latencies for episode in self.episodes])
-        statuses = sum((episode.statuses for episode in self.episodes), Counter[str]())
-        return {
-            "task": self.task,
-            "decoder": self.decoder,
-            "successes": self.successes,
-            "episodes": len(self.episodes),
-            "interval": list(exact_interval(self.successes, len(self.episodes))),
-            "failures": dict(self.failures.most_common()),
-            "statuses": dict(statuses.most_common()),
-            "invalid_rate": sum(episode.invalid for episode in self.episodes) / len(latencies),
+        return summarise(self.task, self.decoder, self.episodes) | {
             "decode_p50_ms": 1e3 * float(np.percentile(latencies, 50)),
             "decode_p99_ms": 1e3 * float(np.percentile(latencies, 99)),
-            "max_joint_step": max(episode.joint_step for episode in self.episodes),
             "mean_steps": len(latencies) / len(self.episodes),
         }
 
