@@ -21,20 +21,27 @@ COLOURS = {"joint": "#56B4E9", "erj": "#009E73", "era": "#CC79A7", "task-nearest
 
 
 def success_table(cells: Sequence[Mapping[str, Any]]) -> str:
-    """Render results as a Markdown table."""
-    rows = [
-        "| Task | Decoder | Success | 95 % interval | Failures | Invalid actions | Decode p50 / p99 | Largest step |",
-        "|---|---|---|---|---|---|---|---|",
-    ]
+    """Render results of rollouts or replays as a Markdown table."""
+    headings = ["Task", "Decoder", "Success", "95 % interval", "Failures", "Invalid actions"]
+    timed, compared = "decode_p50_ms" in cells[0], "max_joint_deviation" in cells[0]
+    headings += ["Decode p50 / p99"] * timed + ["Joints off the demo by"] * compared + ["Largest step"]
+    rows = []
     for cell in cells:
         low, high = cell["interval"]
-        failures = ", ".join(f"{name} {count}" for name, count in cell["failures"].items()) or "–"
-        rows.append(
-            f"| {cell['task']} | {cell['decoder']} | **{cell['successes']}/{cell['episodes']}** "
-            f"| {low:.1%} – {high:.1%} | {failures} | {cell['invalid_rate']:.1%} "
-            f"| {cell['decode_p50_ms']:.2f} / {cell['decode_p99_ms']:.2f} ms | {cell['max_joint_step']:.3f} rad |"
-        )
-    return "\n".join(rows)
+        row = [
+            cell["task"],
+            cell["decoder"],
+            f"**{cell['successes']}/{cell['episodes']}**",
+            f"{low:.1%} – {high:.1%}",
+            ", ".join(f"{name} {count}" for name, count in cell["failures"].items()) or "–",
+            f"{cell['invalid_rate']:.1%}",
+        ]
+        if timed:
+            row.append(f"{cell['decode_p50_ms']:.2f} / {cell['decode_p99_ms']:.2f} ms")
+        if compared:
+            row.append(f"{cell['max_joint_deviation']:.3f} rad")
+        rows.append([*row, f"{cell['max_joint_step']:.3f} rad"])
+    return "\n".join(f"| {' | '.join(row)} |" for row in [headings, ["---"] * len(headings), *rows])
 
 
 def write_chart(cells: Sequence[Mapping[str, Any]], path: Path) -> None:
