@@ -2,10 +2,13 @@
 
 import os
 import sys
+from ctypes.util import find_library
 
-# Read by MuJoCo when it is imported: without a display, only EGL (or OSMesa) can render.
+# Read by MuJoCo when it is imported: without a display, EGL can render, but where it is missing not even
+# the physics would start.
 if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-    os.environ.setdefault("MUJOCO_GL", "egl")
+    if find_library("EGL"):
+        os.environ.setdefault("MUJOCO_GL", "egl")
 
 import gymnasium
 

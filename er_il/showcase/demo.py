@@ -15,7 +15,7 @@ from rich.progress import Progress, TaskID
 
 from er_il.data.recipe import Recipe
 from er_il.data.recording import generate
-from er_il.errors import ErIlError
+from er_il.errors import ErIlError, RenderError
 from er_il.policy.actor import POLICY_ROWS
 from er_il.policy.decoders import decoder
 from er_il.policy.evaluation import FIRST_SEED, Cell, evaluate
@@ -112,7 +112,11 @@ class Demo:
             _Schedule(self, pool, progress).run()
             cells = [self._cell(name) for name in self.decoders]
             policies = {name: self.training(decoder(name).space).policy for name in self.decoders}
-            pictures = film_rollouts(pool, progress, policies, self.task, telling_seed(cells), self.out)
+            try:
+                pictures = film_rollouts(pool, progress, policies, self.task, telling_seed(cells), self.out)
+            except RenderError as error:
+                progress.console.print(f"No films and pictures: {error}", highlight=False)
+                pictures = {}
         meta = {
             "demonstrations": recipe.episodes,
             "trained_on": recipe.episodes - recipe.validation,
