@@ -5,13 +5,10 @@ So the arm bends at the new shoulder, then goes on as the Panda does from its fi
 """
 
 import copy
-import hashlib
-import os
-import tempfile
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
-from er_il.urdf import example_robot_data, parse_urdf
+from er_il.urdf import example_robot_data, generated_urdf, parse_urdf
 
 PREFIX = "panda_base_"  # of the new links and joints
 NEW = ("link1", "joint1", "link2", "joint2")
@@ -20,15 +17,7 @@ NEW = ("link1", "joint1", "link2", "joint2")
 def panda8_urdf() -> Path:
     """Path of the generated URDF, written on first use to the folder for temporary files."""
     panda = example_robot_data("panda_description/urdf/panda.urdf")
-    text = _panda8_xml(parse_urdf(panda), panda.parents[4])
-    folder = Path(tempfile.gettempdir()) / f"er_il-{hashlib.sha256(text.encode()).hexdigest()[:12]}"
-    path = folder / "panda8.urdf"
-    if not path.exists():
-        folder.mkdir(exist_ok=True)
-        partial = folder / f"panda8.{os.getpid()}.partial"
-        partial.write_text(text)
-        partial.replace(path)  # whole under its name, whichever process is first
-    return path
+    return generated_urdf(_panda8_xml(parse_urdf(panda), panda.parents[4]), "panda8.urdf")
 
 
 def _panda8_xml(panda: ET.Element, packages: Path) -> str:

@@ -25,7 +25,6 @@ from er_il.qp import PoseQp
 POSITION_TOLERANCE = 1e-4  # [m]
 ROTATION_TOLERANCE = 1e-3  # [rad]
 MAX_ITERATIONS = 50
-POSTURE_ITERATIONS = 30
 DAMPING_GROWTH = 1e-2  # [1] damping per squared miss in m and rad
 CAUTION = 10.0  # damping grows by this factor after a step that overshot, and shrinks after one that did not
 POLISH = 1e-8  # [m and rad] solve this far: the last steps are quadratic, and near a fold joints need it

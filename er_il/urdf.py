@@ -1,7 +1,10 @@
 """URDF files: finding, reading and simplifying them."""
 
+import hashlib
 import importlib.metadata
 import math
+import os
+import tempfile
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from pathlib import Path
@@ -45,6 +48,18 @@ def parse_urdf(path: Path) -> ET.Element:
     if root.tag != "robot" or root.find("link") is None:
         raise ArmError(f"{path} is not a URDF: it has no <robot> with links.")
     return root
+
+
+def generated_urdf(text: str, name: str) -> Path:
+    """Path of a file with that text, in the folder for temporary files; written on first use."""
+    folder = Path(tempfile.gettempdir()) / f"er_il-{hashlib.sha256(text.encode()).hexdigest()[:12]}"
+    path = folder / Path(name).name
+    if not path.exists():
+        folder.mkdir(exist_ok=True)
+        partial = folder / f"{path.name}.{os.getpid()}.partial"
+        partial.write_text(text)
+        partial.replace(path)  # whole under its name, whichever process is first
+    return path
 
 
 def kinematic_xml(path: Path, movable: Sequence[str] | None = None) -> str:

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-BOX, CYLINDER, CAPSULE, MESH = (
+BOX, CYLINDER, MESH = (
     mujoco.mjtGeom.mjGEOM_BOX,
     mujoco.mjtGeom.mjGEOM_CYLINDER,
-    mujoco.mjtGeom.mjGEOM_CAPSULE,
     mujoco.mjtGeom.mjGEOM_MESH,
 )
 

@@ -1,15 +1,12 @@
 """Arms that travel with their data: what a specification adds so that a URDF's arm can be rebuilt without the file."""
 
-import hashlib
-import os
-import tempfile
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 from er_il.arm import PRESETS, Arm, ArmAngleFrames
+from er_il.urdf import generated_urdf
 
 _DYNAMICS = ("inertial", "transmission", "gazebo", "material")
 
@@ -33,7 +30,7 @@ def arm_from_spec(described: Mapping[str, Any]) -> Arm:
         return Arm.preset(described["name"])
     frames = described["angle_frames"]
     return Arm.from_urdf(
-        _file(described["xml"], described["urdf"]),
+        generated_urdf(described["xml"], described["urdf"]),
         name=described["name"],
         joints=described["joints"],
         base_frame=described["base_frame"],
@@ -52,15 +49,3 @@ def _kinematic_text(xml: str) -> str:
     for element in root.iter():
         element.text = element.tail = None  # indentation
     return ET.tostring(root, encoding="unicode")
-
-
-def _file(text: str, name: str) -> Path:
-    """Path of a file with that text, in the folder for temporary files."""
-    folder = Path(tempfile.gettempdir()) / f"er_il-{hashlib.sha256(text.encode()).hexdigest()[:12]}"
-    path = folder / Path(name).name
-    if not path.exists():
-        folder.mkdir(exist_ok=True)
-        partial = folder / f"{path.name}.{os.getpid()}.partial"
-        partial.write_text(text)
-        partial.replace(path)  # whole under its name, whichever process is first
-    return path

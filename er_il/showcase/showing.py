@@ -12,7 +12,7 @@ from er_il.policy.results import write_cells
 from er_il.policy.rollout import SUCCESS, record_rollout
 from er_il.provenance import provenance
 from er_il.showcase.pictures import Picture, Row, moments, write_film, write_strip
-from er_il.showcase.report import PAGE, write_page
+from er_il.showcase.report import write_page
 
 FILM_EVERY = 2  # control steps a picture: shadows make each expensive
 MOMENTS = 5  # pictures of a rollout in the strip
@@ -67,11 +67,10 @@ def film_rollouts(
 
 def write_report(
     cells: Sequence[Cell], meta: Mapping[str, Any], folder: Path, introduction: str, pictures: Mapping[str, str]
-) -> Path:
-    """Write the JSON, the CSV, the chart and the page; return the page."""
+) -> None:
+    """Write the JSON, the CSV, the chart and the page."""
     write_cells(cells, provenance() | dict(meta), folder)
     write_page(folder, f"er_il demo: {cells[0].task}", introduction, pictures)
-    return folder / PAGE
 
 
 def _film(policy: Path, task: str, name: str, seed: int, folder: Path) -> Row:
