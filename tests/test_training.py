@@ -11,7 +11,7 @@ from er_il.data.recipe import Recipe
 from er_il.data.recording import generate
 from er_il.errors import DatasetError, PolicyError, UnknownNameError
 from er_il.policy.evaluation import evaluate
-from er_il.policy.training import Training, default_config, pretrained
+from er_il.policy.training import Training, default_config, input_features, pretrained
 
 RECIPE = Recipe.load("reach_cup").resized(3)
 
@@ -39,6 +39,33 @@ def test_the_command_trains_on_the_training_episodes_and_declares_the_actions(da
     assert command[0] == "lerobot-train"
     assert "--dataset.episodes=[0,1]" in command
     assert '--policy.tags=["er_il:erj/panda/panda_hand_tcp/quat/panda_joint1"]' in command
+
+
+def test_inputs_are_those_of_the_configuration_in_the_shapes_of_the_dataset(tmp_path: Path):
+    features = {
+        "observation.state": {"shape": [16]},
+        "observation.environment_state": {"shape": [28]},
+        "observation.images.wrist": {"shape": [96, 128, 3]},
+        "observation.images.shoulder": {"shape": [96, 128, 3]},
+    }
+    state, poses = {"type": "STATE", "shape": [16]}, {"type": "ENV", "shape": [28]}
+    assert input_features(default_config("erj"), features) == {
+        "observation.state": state,
+        "observation.environment_state": poses,
+    }
+    images, camera = default_config("erj").with_name("act_erj_images.yaml"), {"type": "VISUAL", "shape": [3, 96, 128]}
+    assert input_features(images, features) == {
+        "observation.state": state,
+        "observation.images.wrist": camera,
+        "observation.images.shoulder": camera,
+    }
+    with pytest.raises(PolicyError, match="Record it with --cameras"):
+        input_features(images, {"observation.state": {"shape": [16]}})
+    with pytest.raises(PolicyError, match="wants observation.environment_state"):
+        input_features(default_config("erj"), {"observation.state": {"shape": [16]}})
+    own = tmp_path / "own.yaml"
+    own.write_text("policy: {type: act}")
+    assert input_features(own, features) == {}
 
 
 @pytest.mark.slow
@@ -112,7 +139,7 @@ def test_mistakes(datasets: Path, tmp_path: Path):
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (["train", "reach_cap", "erj"], "Unknown task 'reach_cap'. Valid: lift_cup, reach_cup."),
+        (["train", "reach_cap", "erj"], "Unknown task 'reach_cap'. Valid: lift_cup, "),
         (["train", "reach_cup", "ejr"], "Unknown action space 'ejr'."),
         (["train", "reach_cup", "erj", "--dataset", "nowhere"], "No dataset at nowhere"),
         (["eval", "nowhere", "--task", "reach_cup", "--decoder", "erj"], "No policy at nowhere"),

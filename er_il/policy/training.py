@@ -5,14 +5,15 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import yaml
 
 from er_il.data.recipe import TRAIN
-from er_il.data.schema import action_spec
+from er_il.data.schema import IMAGES, action_spec
 from er_il.errors import DatasetError, PolicyError, UnknownNameError
 from er_il.policy.contract import Contract, dataset_info
 from er_il.resources import data_dir
@@ -60,6 +61,7 @@ class Training:
             return [STOCK, f"--config_path={last / _PRETRAINED / 'train_config.json'}", "--resume=true", *self._length]
         info = dataset_info(self.dataset)
         contract = Contract.of_spec(action_spec(info["features"]))
+        inputs = input_features(self.config, info["features"])
         return [
             STOCK,
             f"--config_path={self.config}",
@@ -67,6 +69,7 @@ class Training:
             f"--dataset.root={self.dataset}",
             f"--dataset.episodes={json.dumps(_train_episodes(info), separators=(',', ':'))}",
             f"--policy.tags={json.dumps([contract.tag])}",
+            *([f"--policy.input_features={json.dumps(inputs)}"] if inputs else []),
             f"--output_dir={self.out}",
             f"--seed={self.seed}",
             *self._length,
@@ -144,6 +147,33 @@ def default_steps(config: Path) -> int:
         return int(yaml.safe_load(config.read_text())["steps"])
     except (OSError, yaml.YAMLError, KeyError, TypeError, ValueError) as error:
         raise PolicyError(f"There is no training configuration {config} that says how many steps to take.") from error
+
+
+def input_features(config: Path, features: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Return what a policy sees of a dataset: the inputs that a configuration names, in the dataset's own shapes.
+
+    A configuration holds the shapes of the cup tasks on an arm with seven joints. Where it names a camera, all
+    cameras of the dataset take its place. Empty if it names nothing: LeRobot then takes all there is.
+
+    Args:
+        config: Configuration of the training.
+        features: The dataset's features, as in its ``info.json``.
+
+    Raises:
+        PolicyError: the dataset lacks an input, or has no camera where the configuration has one.
+    """
+    named = yaml.safe_load(config.read_text()).get("policy", {}).get("input_features") or {}
+    inputs = {key: feature for key, feature in named.items() if not key.startswith(IMAGES)}
+    if missing := [key for key in inputs if key not in features]:
+        raise PolicyError(f"{config} wants {', '.join(missing)}, which the dataset does not have.")
+    shapes = {key: features[key]["shape"] for key in inputs}
+    if len(inputs) < len(named):
+        cameras = {key: feature["shape"] for key, feature in features.items() if key.startswith(IMAGES)}
+        if not cameras:
+            raise PolicyError(f"{config} is for images; the dataset has none. Record it with --cameras.")
+        inputs |= {key: {"type": "VISUAL"} for key in cameras}
+        shapes |= {key: [channels, height, width] for key, (height, width, channels) in cameras.items()}
+    return {key: {"type": feature["type"], "shape": list(shapes[key])} for key, feature in inputs.items()}
 
 
 def pretrained(path: Path) -> Path:
