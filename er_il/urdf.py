@@ -13,6 +13,7 @@ import pinocchio as pin  # pyright: ignore[reportMissingImports]
 
 from er_il.errors import ArmError
 
+PACKAGE = "package://"
 TURN = 2.0 * math.pi  # [rad] a continuous joint gets limits of one turn to either side
 
 
@@ -48,6 +49,26 @@ def parse_urdf(path: Path) -> ET.Element:
     if root.tag != "robot" or root.find("link") is None:
         raise ArmError(f"{path} is not a URDF: it has no <robot> with links.")
     return root
+
+
+def find_mesh(name: str, urdf: Path) -> Path:
+    """Find a mesh by the name that a URDF gives it.
+
+    Raises:
+        ArmError: there is no such file.
+    """
+    if not name.startswith(PACKAGE):
+        candidates = [urdf.parent / name.removeprefix("file://")]
+    else:
+        package, _, inside = name.removeprefix(PACKAGE).partition("/")
+        # A package is a folder above the URDF, a sibling of one, or on ROS's path.
+        shelves = [*urdf.resolve().parents, *map(Path, filter(None, os.environ.get("ROS_PACKAGE_PATH", "").split(":")))]
+        candidates = [shelf / inside for shelf in shelves if shelf.name == package]
+        candidates += [shelf / package / inside for shelf in shelves]
+    for candidate in candidates:
+        if candidate.is_file():
+            return candidate
+    raise ArmError(f"{urdf.name} names the mesh {name}, which is not to be found. Set ROS_PACKAGE_PATH to its package.")
 
 
 def generated_urdf(text: str, name: str) -> Path:

@@ -20,7 +20,7 @@ from sim_tasks.contact import contact_force
 from sim_tasks.geometry import world_shapes
 from sim_tasks.leader import Leader
 from sim_tasks.motion import Stretch
-from sim_tasks.robot import FINGER_BODIES, RobotModel
+from sim_tasks.robot import FINGER_BODIES, RobotModel, lift
 from sim_tasks.scene import scene_spec
 
 RATE = 20  # [Hz] of control
@@ -45,9 +45,10 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
     task: ClassVar[str]
     task_description: ClassVar[str]
     max_steps: ClassVar[int]
-    objects: ClassVar[tuple[str, ...]]  # free bodies, in the order of environment_state
+    objects: ClassVar[tuple[str, ...]]  # bodies that move, in the order of environment_state
     obstacles: ClassVar[tuple[str, ...]]  # bodies that the robot must not run into
-    start: ClassVar[tuple[float, ...]]  # (n,) [rad]
+    arms: ClassVar[tuple[str, ...]] = ("panda",)  # presets that can do the task
+    start: ClassVar[tuple[float, ...]]  # (7,) [rad] of the last seven joints; what is below them starts at home
 
     def __init__(
         self,
@@ -64,12 +65,16 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
             cameras: Cameras to observe; none by default, which needs no GL.
             image_size: Side [px] of their square images.
             render_mode: ``rgb_array`` for :meth:`render`.
-            arm: Preset of the follower and the leader.
+            arm: Preset of the follower and the leader, one of the task's ``arms``.
             start_range: Each joint starts up to this far [rad] from the start posture.
         """
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise UnknownNameError("render mode", render_mode, self.metadata["render_modes"])
+        if arm not in self.arms:
+            raise UnknownNameError(f"arm for {self.task}", arm, self.arms)
         self.arm = Arm.preset(arm)
+        # Tasks are measured from a Panda's shoulder: what stands before an arm that is taller stands higher, too.
+        self.lift = lift(self.arm)
         self.render_mode = render_mode
         self._start_range = start_range
         spec = scene_spec(self.arm)
@@ -144,7 +149,8 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
 
     def object_pose(self, name: str) -> np.ndarray:
         """An object's position [m] and quaternion (x, y, z, w), (7,)."""
-        return self._data.joint(name).qpos[[0, 1, 2, 4, 5, 6, 3]]
+        body = self._data.body(name)
+        return np.concatenate([body.xpos, body.xquat[[1, 2, 3, 0]]])
 
     def scene_geometry(self) -> list[Shape]:
         """The world around the robot as shapes to draw, as of the last reset."""
@@ -155,7 +161,9 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Start an episode. ``options={"state": {name: (x, y, yaw)}}`` places objects by hand."""
         super().reset(seed=seed)
-        start = np.array(self.start) + self.np_random.uniform(-self._start_range, self._start_range, self.arm.dof)
+        below = self.arm.home[: self.arm.dof - len(self.start)]
+        start = np.append(below, self.start)
+        start += self.np_random.uniform(-self._start_range, self._start_range, self.arm.dof)
         placement = self._draw(self.np_random)
         chosen = (options or {}).get("state", {})
         for name, where in chosen.items():

@@ -25,13 +25,14 @@ class View:
     fovy: float  # [deg]
     up: tuple[float, float, float] = UP
 
-    def add(self, spec: mujoco.MjSpec) -> None:
-        """Add the camera to a spec."""
+    def add(self, spec: mujoco.MjSpec, lift: float) -> None:
+        """Add the camera to a spec; one that stands in the world stands ``lift`` [m] higher."""
         back = np.subtract(self.position, self.target)  # a MuJoCo camera looks along its own -z
         right = np.cross(self.up, back)
         axes = np.column_stack([right, np.cross(back, right), back])
         x, y, z, w = Rotation.from_matrix(axes / np.linalg.norm(axes, axis=0)).as_quat()
-        spec.body(self.body).add_camera(name=self.name, pos=self.position, quat=(w, x, y, z), fovy=self.fovy)
+        position = np.add(self.position, (0.0, 0.0, lift if self.body == "world" else 0.0))
+        spec.body(self.body).add_camera(name=self.name, pos=position, quat=(w, x, y, z), fovy=self.fovy)
 
 
 SHOWCASE = "showcase"

@@ -23,7 +23,7 @@ class Keyframe:
     """A pose for the hand on the way, with the elbow that should take it there."""
 
     T_base_ee: np.ndarray  # (4, 4)
-    elbow: float | None  # [rad] wished angle of the arm's first redundant joint; None: that of the nearest posture
+    elbow: float | None  # [rad] wished angle of the arm's last redundant joint; None: that of the nearest posture
     straight: bool = False  # the hand moves here on a straight line
 
 
@@ -60,19 +60,28 @@ def solve_keyframe(arm: Arm, keyframe: Keyframe, seed: Vector, is_free: Callable
     Raises:
         PlanError: no elbow within the search range is reachable and free.
     """
-    joint = arm.redundant[0]
-    wish = keyframe.elbow
-    if wish is None:
-        nearest = kinematics_of(arm).solve(keyframe.T_base_ee, seed).q[arm.joints.index(joint)]
-        # Free joints differ in the last bits from process to process; a rounded wish leads all to the same plan.
-        wish = round(float(nearest), 4)
+    wishes = _wishes(arm, keyframe, seed)
+    elbow = arm.redundant[-1]
     offsets = [sign * offset for offset in ELBOW_SEARCH for sign in (1, -1)]
     for offset in offsets:
-        ik = kinematics_of(arm).solve(keyframe.T_base_ee, seed, fixed={joint: wish + offset})
+        fixed = wishes | {elbow: wishes[elbow] + offset}
+        ik = kinematics_of(arm).solve(keyframe.T_base_ee, seed, fixed=fixed)
         if ik.status is Status.OK and is_free(ik.q):
             return ik.q
     x, y, z = keyframe.T_base_ee[:3, 3]
-    raise PlanError(f"No collision-free elbow near {wish:.2f} rad for the hand at ({x:.2f}, {y:.2f}, {z:.2f}).")
+    raise PlanError(
+        f"No collision-free elbow near {wishes[elbow]:.2f} rad for the hand at ({x:.2f}, {y:.2f}, {z:.2f})."
+    )
+
+
+def _wishes(arm: Arm, keyframe: Keyframe, seed: Vector) -> dict[str, float]:
+    """Angles [rad] of all redundant joints: the keyframe's where it has a wish, else those of the nearest posture."""
+    wishes = {} if keyframe.elbow is None else {arm.redundant[-1]: keyframe.elbow}
+    if left := [joint for joint in arm.redundant if joint not in wishes]:
+        nearest = kinematics_of(arm).solve(keyframe.T_base_ee, seed, fixed=wishes).q
+        # Free joints differ in the last bits from process to process; a rounded wish leads all to the same plan.
+        wishes |= {joint: round(float(nearest[arm.joints.index(joint)]), 4) for joint in left}
+    return wishes
 
 
 def plan_stretch(
@@ -96,19 +105,19 @@ def plan_stretch(
 
 
 def _straight(arm: Arm, start: Vector, goal: Vector, keyframe: Keyframe) -> list[Vector]:
-    """Waypoints after the start along a straight line of the hand, the elbow turning evenly."""
-    kinematics, joint = kinematics_of(arm), arm.redundant[0]
+    """Waypoints after the start along a straight line of the hand, the redundant joints turning evenly."""
+    kinematics = kinematics_of(arm)
     T_start, T_goal = kinematics.fk(start), keyframe.T_base_ee
     steps = max(1, int(np.ceil(np.linalg.norm(T_goal[:3, 3] - T_start[:3, 3]) / STRAIGHT_STEP)))
     turn = Slerp([0, 1], Rotation.from_matrix([T_start[:3, :3], T_goal[:3, :3]]))
-    elbow = arm.joints.index(joint)
+    redundant = {joint: arm.joints.index(joint) for joint in arm.redundant}
     waypoints = [start]
     for t in np.arange(1, steps + 1) / steps:
         T = np.eye(4)
         T[:3, :3] = turn(t).as_matrix()
         T[:3, 3] = (1 - t) * T_start[:3, 3] + t * T_goal[:3, 3]
-        angle = (1 - t) * start[elbow] + t * goal[elbow]
-        ik = kinematics.solve(T, waypoints[-1], fixed={joint: angle})
+        angles = {joint: (1 - t) * start[i] + t * goal[i] for joint, i in redundant.items()}
+        ik = kinematics.solve(T, waypoints[-1], fixed=angles)
         if ik.status is not Status.OK:
             raise PlanError("The hand cannot follow the straight line to a keyframe.")
         waypoints.append(ik.q)

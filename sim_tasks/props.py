@@ -1,7 +1,7 @@
 """Things in the worlds: each function adds one to a spec, sized in metres, standing at its frame's origin."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -77,6 +77,10 @@ class Cabinet:
     ceiling: float = 0.76
     wall: float = 0.018
 
+    def raised(self, lift: float) -> "Cabinet":
+        """The cabinet with its compartment ``lift`` [m] higher."""
+        return replace(self, floor=self.floor + lift, ceiling=self.ceiling + lift)
+
     def add(self, spec: mujoco.MjSpec, name: str, material: str, inside: str, sides: str) -> mujoco.MjsBody:
         """Add the cabinet, fixed to the world; its back has the ``inside`` material."""
         body = spec.worldbody.add_body(name=name)
@@ -105,6 +109,10 @@ class Wall:
     height: float = 0.95
     thickness: float = 0.02
 
+    def raised(self, lift: float) -> "Wall":
+        """The wall, ``lift`` [m] higher."""
+        return replace(self, height=self.height + lift)
+
     def add(self, spec: mujoco.MjSpec, name: str, material: str) -> mujoco.MjsBody:
         """Add the wall, fixed to the world."""
         body = spec.worldbody.add_body(name=name)
@@ -122,6 +130,10 @@ class Stand:
     height: float = 0.50
     size: tuple[float, float] = (0.24, 0.30)
 
+    def raised(self, lift: float) -> "Stand":
+        """The stand with its top ``lift`` [m] higher."""
+        return replace(self, height=self.height + lift)
+
     def add(self, spec: mujoco.MjSpec, name: str, material: str) -> mujoco.MjsBody:
         """Add the stand, fixed to the world."""
         body = spec.worldbody.add_body(name=name, pos=(*self.centre, 0.0))
@@ -131,6 +143,61 @@ class Stand:
         body.add_geom(name=f"{name}_top", type=BOX, size=top, pos=(0, 0, self.height - t), material=material)
         body.add_geom(name=f"{name}_column", type=CYLINDER, size=column, pos=(0, 0, column[1]), material=material)
         return body
+
+
+@dataclass(frozen=True)
+class PushButton:
+    """A mushroom push button on a pedestal. Heights [m] above what the pedestal stands on."""
+
+    height: float = 0.30  # of the pedestal's top
+    radius: float = 0.05  # of the cap
+    dome: float = 0.025  # height of the cap
+    travel: float = 0.04  # down to its stop
+    stiffness: float = 300.0  # [N/m] of the spring under it
+    mass: float = 0.05  # [kg] of the cap
+
+    @property
+    def rest(self) -> float:
+        """Height of the cap's underside while nobody presses."""
+        return self.height + self.travel + 0.005  # a gap at the stop: the cap never touches the pedestal
+
+    def add(self, spec: mujoco.MjSpec, name: str, pedestal: str, material: str, base: str) -> None:
+        """Add a pedestal that can be put anywhere (a mocap body), and on it the cap, which slides along its z."""
+        stand = spec.worldbody.add_body(name=pedestal, mocap=True)
+        housing = 0.05  # height of the collar at the pedestal's top
+        parts = (("foot", 0.07, 0.0, 0.01, "steel"), ("column", 0.02, 0.01, self.height - housing, "steel"))
+        parts += (("housing", 0.9 * self.radius, self.height - housing, self.height, base),)
+        for part, radius, low, high, look in parts:
+            size, position = (radius, (high - low) / 2, 0), (0, 0, (low + high) / 2)
+            stand.add_geom(name=f"{pedestal}_{part}", type=CYLINDER, size=size, pos=position, material=look)
+        cap = stand.add_body(name=name, pos=(0, 0, self.rest), gravcomp=1)
+        # Damped critically: it springs back at once, and does not swing.
+        damping = 2 * (self.stiffness * self.mass) ** 0.5
+        cap.add_joint(
+            name=name,
+            type=mujoco.mjtJoint.mjJNT_SLIDE,
+            axis=(0, 0, 1),
+            range=(-self.travel, 0),
+            limited=True,
+            stiffness=self.stiffness,
+            damping=damping,
+        )
+        mesh = spec.add_mesh(name=name)
+        t = np.linspace(0, np.pi / 2, 10)
+        vertices, faces = _lathe(np.array([(0, 0), *zip(self.radius * np.cos(t), self.dome * np.sin(t), strict=True)]))
+        mesh.uservert, mesh.userface = vertices.ravel(), faces.ravel()
+        cap.add_geom(name=f"{name}_cap", type=MESH, meshname=name, material=material, mass=self.mass)
+        shaft = (self.rest - self.height) / 2
+        cap.add_geom(
+            name=f"{name}_shaft",
+            type=CYLINDER,
+            size=(0.35 * self.radius, shaft, 0),
+            pos=(0, 0, -shaft),
+            material="steel",
+            mass=0,
+            contype=0,
+            conaffinity=0,
+        )
 
 
 def _lathe(profile: np.ndarray, segments: int = 36) -> tuple[np.ndarray, np.ndarray]:

@@ -1,4 +1,4 @@
-"""The Panda in MuJoCo, built from the same URDF that the kinematics read."""
+"""An arm with the Panda's hand in MuJoCo, built from the same URDF that the kinematics read."""
 
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
@@ -8,7 +8,10 @@ import mujoco
 import numpy as np
 
 from er_il.arm import Arm
+from er_il.kinematics import kinematics_of
+from er_il.urdf import find_mesh, parse_urdf
 
+SHOULDER = "panda_link1"  # the link that turns the upper arm; the tasks are measured from a Panda's
 FINGERS = ("panda_finger_joint1", "panda_finger_joint2")
 FINGER_BODIES = ("panda_leftfinger", "panda_rightfinger")
 FINGER_TRAVEL = 0.04  # [m] each finger, from closed to open
@@ -22,7 +25,6 @@ FINGER_KP, FINGER_KV, FINGER_FORCE = 1000.0, 40.0, 35.0  # [N/m], [Ns/m], [N]
 
 # Convex hulls of neighbouring links overlap by design, not by collision.
 OVERLAPPING = (
-    ("panda_link0", "panda_link1"),
     ("panda_link5", "panda_link7"),
     ("panda_link5", "panda_hand"),
     ("panda_link6", "panda_hand"),
@@ -100,22 +102,32 @@ def robot_spec(arm: Arm) -> mujoco.MjSpec:
     gripper.ctrlrange = (0, FINGER_TRAVEL)
     coupling = spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, name1=FINGERS[1], name2=FINGERS[0])
     coupling.data[:2] = (0.0, 1.0)
-    for one, other in OVERLAPPING:
+    # MuJoCo lets a link pass through the one that carries it, except where that one is fixed to the world.
+    lowest = spec.joint(arm.joints[0]).parent
+    for one, other in ((lowest.parent.name, lowest.name), *OVERLAPPING):
         spec.add_exclude(bodyname1=one, bodyname2=other)
     return spec
+
+
+def lift(arm: Arm) -> float:
+    """How much higher [m] an arm carries its shoulder than the Panda does, both at home."""
+
+    def height(which: Arm) -> float:
+        return float(kinematics_of(which).frame_pose(which.home, SHOULDER)[2, 3])
+
+    return round(height(arm) - height(Arm.preset("panda")), 6)
 
 
 @lru_cache
 def _mujoco_urdf(arm: Arm) -> str:
     """The URDF as MuJoCo's parser wants it: collision shapes only, meshes found by file name."""
-    root = ET.parse(arm.urdf).getroot()
+    root = parse_urdf(arm.urdf)
     folder = ""
     for link in root.findall("link"):
         for visual in link.findall("visual"):
             link.remove(visual)
         for mesh in link.iter("mesh"):
-            package_path = mesh.get("filename", "").removeprefix("package://")
-            folder = str((arm.urdf.parents[4] / package_path).parent)
+            folder = str(find_mesh(mesh.get("filename", ""), arm.urdf).parent)
     for joint in root.findall("joint"):
         for tag in ("safety_controller", "mimic"):  # unknown to MuJoCo, and replaced by the equality
             for element in joint.findall(tag):

@@ -5,7 +5,7 @@ import mujoco
 from er_il.arm import Arm
 from sim_tasks.camera import LARGEST_PICTURE, VIEWS
 from sim_tasks.props import BOX
-from sim_tasks.robot import robot_spec
+from sim_tasks.robot import lift, robot_spec
 
 # name: colour, specular, shininess, reflectance
 MATERIALS = {
@@ -15,6 +15,9 @@ MATERIALS = {
     "glass": ((0.75, 0.88, 0.92, 0.28), 0.6, 0.8, 0.0),
     "plaster": ((0.78, 0.76, 0.72, 1.0), 0.05, 0.1, 0.0),
     "copper": ((0.83, 0.42, 0.22, 1.0), 0.9, 0.8, 0.0),
+    "steel": ((0.30, 0.32, 0.35, 1.0), 0.4, 0.5, 0.0),
+    "red": ((0.78, 0.08, 0.07, 1.0), 0.5, 0.5, 0.0),
+    "yellow": ((0.95, 0.76, 0.10, 1.0), 0.3, 0.4, 0.0),
 }
 
 
@@ -53,5 +56,5 @@ def scene_spec(arm: Arm) -> mujoco.MjSpec:
                 type=BOX, size=(0.025, 0.025, 0.355), pos=(x, y, -0.395), material="bench", contype=0, conaffinity=0
             )
     for view in VIEWS:
-        view.add(spec)
+        view.add(spec, lift(arm))
     return spec

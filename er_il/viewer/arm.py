@@ -1,6 +1,5 @@
 """The arm in Rerun: its URDF's shapes once, and one transform column a joint."""
 
-import os
 import tempfile
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
@@ -11,16 +10,15 @@ import rerun as rr
 from rerun.urdf import UrdfJoint, UrdfTree
 
 from er_il.arm import Arm
-from er_il.errors import ArmError
 from er_il.kinematics import kinematics_of
 from er_il.trace import Array
+from er_il.urdf import find_mesh
 
 ARM = "arm"
 BONES = f"{ARM}/bones"  # of an arm without shapes, as those that travel with their data
 FIXED = f"{ARM}/fixed"  # transforms of the URDF at rest
 JOINTS = f"{ARM}/joints"
 ROOT_FRAME = "tf#/"  # Rerun's name for the frame of the whole recording: the arm's base
-PACKAGE = "package://"
 BONE_RADIUS = 0.01  # [m]
 COLOUR = (0.85, 0.87, 0.9, 1.0)
 
@@ -86,24 +84,8 @@ def drawable_urdf(path: Path) -> str:
             ET.SubElement(material, "color", rgba=" ".join(map(str, COLOUR)))
             link.append(shape)
     for mesh in robot.iter("mesh"):
-        mesh.set("filename", str(_mesh(mesh.get("filename", ""), path)))
+        mesh.set("filename", str(find_mesh(mesh.get("filename", ""), path)))
     return ET.tostring(robot, encoding="unicode")
-
-
-def _mesh(name: str, urdf: Path) -> Path:
-    """Find a mesh by the name that the URDF gives it."""
-    if not name.startswith(PACKAGE):
-        candidates = [urdf.parent / name.removeprefix("file://")]
-    else:
-        package, _, inside = name.removeprefix(PACKAGE).partition("/")
-        # A package is a folder above the URDF, a sibling of one, or on ROS's path.
-        shelves = [*urdf.resolve().parents, *map(Path, filter(None, os.environ.get("ROS_PACKAGE_PATH", "").split(":")))]
-        candidates = [shelf / inside for shelf in shelves if shelf.name == package]
-        candidates += [shelf / package / inside for shelf in shelves]
-    for candidate in candidates:
-        if candidate.is_file():
-            return candidate
-    raise ArmError(f"{urdf.name} names the mesh {name}, which is not to be found. Set ROS_PACKAGE_PATH to its package.")
 
 
 def _log_bones(recording: rr.RecordingStream, joints: Sequence[UrdfJoint]) -> None:
