@@ -8,6 +8,7 @@ import json
 import re
 from pathlib import Path
 
+from er_il.showcase.circle import drift_table
 from er_il.showcase.report import REPORT, success_table
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -20,7 +21,8 @@ def rendered(text: str) -> str:
 
     def table(block: re.Match[str]) -> str:
         report = json.loads((ROOT / block[2] / REPORT).read_text())
-        return f"{block[1]}{success_table(report['cells'])}\n{block[3]}"
+        rendered_table = drift_table(report) if "drives" in report else success_table(report["cells"])
+        return f"{block[1]}{rendered_table}\n{block[3]}"
 
     return BLOCK.sub(table, text)
 

@@ -1,0 +1,64 @@
+"""The hand on a circle: task space loses the elbow, the ER spaces keep it."""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lerobot.model import RobotKinematics
+from matplotlib.image import imread
+
+from er_il import Arm
+from er_il.cli import main
+from er_il.errors import ArmError
+from er_il.showcase.circle import LAPS, POSES, drift_table, drive_all, targets
+from er_il.urdf import generated_urdf
+
+PANDA = Arm.preset("panda")
+
+
+def test_the_elbow_drifts_in_task_space_and_returns_in_er_spaces():
+    drives = {drive.solver: drive for drive in drive_all(PANDA)}
+    assert set(drives) == {"lerobot", "task", "erj", "era"}
+    for solver in ("lerobot", "task"):
+        assert np.all(np.diff(drives[solver].drift) > 0.05)
+        assert drives[solver].drift[-1] > 0.3
+    for solver in ("erj", "era"):
+        assert drives[solver].drift.max() < 1e-4
+        assert np.ptp(drives[solver].elbow, axis=0).max() > 0.1  # it does move on the way
+    for drive in drives.values():  # all of them follow the circle, or the comparison would say nothing
+        assert drive.position_error < 1e-3
+        assert drive.rotation_error < 1e-3
+
+
+def test_lerobots_solver_is_used_as_its_users_use_it():
+    solver = RobotKinematics(str(generated_urdf(PANDA.model_xml, "panda.urdf")), PANDA.ee_frame, list(PANDA.joints))
+    degrees = np.rad2deg(PANDA.home)
+    solver.forward_kinematics(degrees)
+    for pose in targets(PANDA)[: 2 * POSES]:
+        degrees = solver.inverse_kinematics(degrees, pose)
+    drive = drive_all(PANDA)[0]
+    np.testing.assert_allclose(drive.q[2 * POSES], np.deg2rad(degrees), atol=1e-5)
+
+
+def test_the_command_writes_what_it_measured(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    monkeypatch.setattr(sys, "argv", ["er-il", "circle", "--out", str(tmp_path / "new")])
+    main()
+    report = json.loads((tmp_path / "new" / "report.json").read_text())
+    assert report["meta"]["versions"]["lerobot"]
+    assert [len(drive["drift"]) for drive in report["drives"]] == [LAPS] * 4
+    assert imread(tmp_path / "new" / "circle.png").std() > 0.05
+    shown = capsys.readouterr().out
+    for drive, line in zip(report["drives"], drift_table(report).splitlines()[2:], strict=True):
+        drift = f"{100 * drive['drift'][-1]:.1f}"
+        assert drift in shown
+        assert f"| {drift} cm | " in line
+    assert sorted(path.name for path in (tmp_path / "new").iterdir()) == ["circle.png", "report.json"]
+
+
+def test_an_arm_without_an_elbow_is_refused():
+    with pytest.raises(ArmError, match="no elbow to watch"):
+        drive_all(Arm.preset("panda8"))
