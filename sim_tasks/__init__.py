@@ -24,9 +24,10 @@ except (ImportError, AttributeError, RuntimeError) as error:  # each GL backend 
 
 from sim_tasks.arm_task import ArmTask
 from sim_tasks.lift_cup import LiftCup
+from sim_tasks.push_button_elbow import PushButtonElbow
 from sim_tasks.reach_cup import ReachCup
 
-TASKS: tuple[type[ArmTask], ...] = (ReachCup, LiftCup)
+TASKS: tuple[type[ArmTask], ...] = (ReachCup, LiftCup, PushButtonElbow)
 
 for _task in TASKS:
     gymnasium.register(
