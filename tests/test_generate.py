@@ -25,7 +25,7 @@ def test_generate_takes_the_recipe_and_what_is_given_instead(monkeypatch, tmp_pa
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["sweep"], "Unknown task 'sweep'. Valid: lift_cup, reach_cup."),
+        (["sweep"], "Unknown task 'sweep'. Valid: lift_cup, "),
         (["reach_cup", "--spaces", "polar"], "Unknown action space 'polar'. Valid: joint, task, erj"),
         (["reach_cup", "--cameras", "elbow"], "Unknown camera 'elbow'. Valid: "),
         (["reach_cup", "--episodes", "0"], "at least one episode, not 0"),

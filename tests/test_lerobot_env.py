@@ -38,7 +38,7 @@ def test_the_action_is_the_spaces(space: str, rotation: str, dim: int):
 @pytest.mark.parametrize(
     ("options", "choices"),
     [
-        ({"task": "reach_cap"}, "lift_cup, reach_cup"),
+        ({"task": "reach_cap"}, "lift_cup.*reach_cup"),
         ({"action_space": "jiont"}, "joint, task, erj"),
         ({"action_space": "task", "resolution": "best"}, "nearest, posture"),
         ({"rotation": "euler"}, "quat, rot6d"),
