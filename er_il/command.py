@@ -27,6 +27,7 @@ class Command:
     gripper: float  # in [0, 1], 1 open
     status: Status  # of the action it came from
     latency: float  # [s] time the decoding took
+    iters: int  # iterations of IK that it took
     joint_step: float  # [rad] largest joint change that was asked for, before the velocity limit
     followed: bool  # the arm goes where the action says, or as near as it can; else the last command stands
     stopped: bool = False  # the arm holds until the next reset
@@ -118,7 +119,7 @@ class Commander:
         if self._last is None:
             raise RuntimeError("Commander.reset must be called before the first command.")
         started = time.perf_counter()
-        target, gripper, status = self._decode(action, q)
+        target, gripper, status, iters = self._decode(action, q)
         latency = time.perf_counter() - started
         self._stopped |= self.on_invalid == STOP and status is not Status.OK
         asked = float(np.max(np.abs(target - self._last)))
@@ -131,19 +132,19 @@ class Commander:
         self.tally.statuses[status] += 1
         self.tally.latencies.append(latency)
         self.tally.largest_step = max(self.tally.largest_step, asked)
-        return Command(self._last.copy(), self._gripper, status, latency, asked, follows, self._stopped)
+        return Command(self._last.copy(), self._gripper, status, latency, iters, asked, follows, self._stopped)
 
-    def _decode(self, action: ArrayLike, q: ArrayLike) -> tuple[Vector, float, Status]:
+    def _decode(self, action: ArrayLike, q: ArrayLike) -> tuple[Vector, float, Status, int]:
         measured = np.asarray(q, dtype=np.float64)
         assert self._last is not None
         if not np.all(np.isfinite(measured)):
-            return self._last, self._gripper, Status.INVALID
+            return self._last, self._gripper, Status.INVALID, 0
         decoded = self.space.decode(action, seed=measured, current=self._last)
         if decoded.status is Status.INVALID:
-            return self._last, self._gripper, Status.INVALID
+            return self._last, self._gripper, Status.INVALID, 0
         far = np.any(np.abs(decoded.q - measured) > JUMP_PERIODS * self._reach)
         status = Status.JUMP if far and decoded.status is Status.OK else decoded.status
-        return decoded.q, decoded.gripper, status
+        return decoded.q, decoded.gripper, status, decoded.iters
 
     def _runs_away(self, ahead: Vector, q: ArrayLike) -> bool:
         """Whether a command would leave behind an arm that does not come along: it waits for it instead."""

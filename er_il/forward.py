@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
@@ -65,6 +66,31 @@ class ForwardKinematics:
         T = self.fk(q)
         gap = T_base_ee[:3, 3] - T[:3, 3]
         return math.sqrt(gap @ gap), _rotation_angle(T[:3, :3].T @ T_base_ee[:3, :3])
+
+    def pose_gap(self, T_base_ee: Array, q: ArrayLike) -> Vector:
+        """Translation [m] and rotation vector [rad] (6,) from the pose at q to a target pose, in the base's axes."""
+        T = self.fk(q)
+        return np.concatenate([T_base_ee[:3, 3] - T[:3, 3], pin.log3(T_base_ee[:3, :3] @ T[:3, :3].T)])
+
+    def within_reach(self, position: Vector) -> bool:
+        """Whether a position (3,) [m] is no farther from the first joint than the stretched arm is long.
+
+        Farther than that the end effector never gets, whatever the joint limits; nearer it may not either.
+        """
+        centre, radius = self._ball
+        return float(np.linalg.norm(position - centre)) <= radius
+
+    @cached_property
+    def _ball(self) -> tuple[Vector, float]:
+        """First joint's origin (3,) [m] in the base frame, and the length [m] of all that follows, end to end."""
+        model, data = self._model, self._data
+        pin.framesForwardKinematics(model, data, np.zeros(model.nq))
+        ee = model.frames[self._ee]
+        above_base = set(model.supports[model.frames[self._base].parentJoint])
+        first, *others = [joint for joint in model.supports[ee.parentJoint] if joint not in above_base]
+        lengths = [model.jointPlacements[joint].translation for joint in others] + [ee.placement.translation]
+        centre = data.oMf[self._base].actInv(data.oMi[first].translation)
+        return centre, float(sum(np.linalg.norm(length) for length in lengths))
 
     def points(self, q: Vector, frames: Sequence[str]) -> tuple[Array, Array]:
         """Origins (k, 3) [m] of links in the base frame at q (n,) [rad], and their derivatives (k, 3, n)."""

@@ -12,10 +12,9 @@ from er_il.arm import Arm, Vector
 from er_il.arm_angle import ArmAngle
 from er_il.errors import UnknownNameError
 from er_il.forward import ForwardKinematics
-from er_il.search import Attempt, Goal, LocalSearch
+from er_il.search import LIMIT_MARGIN, Attempt, Goal, LocalSearch
 
 FAR = 0.3  # [rad] a solution this far from the seed is looked at with suspicion
-LIMIT_MARGIN = 1e-4  # [rad] a joint this close to its limit is at it
 
 
 class Status(StrEnum):
@@ -23,8 +22,8 @@ class Status(StrEnum):
 
     OK = "ok"
     INVALID = "invalid"  # not finite, or no rotation
-    UNREACHABLE = "unreachable"  # the pose is out of reach with what is fixed
-    LIMIT = "limit"  # a joint limit stands between the solution and the pose
+    UNREACHABLE = "unreachable"  # no way closer to the pose, with what else is commanded, from where the arm is
+    LIMIT = "limit"  # reached, if a joint could pass its limit; or a commanded value beyond its own
     NOT_CONVERGED = "not_converged"  # still approaching when the iterations ran out
     JUMP = "jump"  # solved, but farther from the current posture than the arm moves in a period
 
@@ -37,15 +36,15 @@ class IkResult:
     status: Status
     pos_err: float  # [m]
     rot_err: float  # [rad]
-    iters: int
+    iters: int  # of all attempts
 
 
 class Kinematics(ForwardKinematics):
     """Forward and inverse kinematics of one arm. Not thread-safe: see :func:`kinematics_of`."""
 
-    def __init__(self, arm: Arm) -> None:
+    def __init__(self, arm: Arm, damped: bool = True) -> None:
         super().__init__(arm)
-        self._search = LocalSearch(self)
+        self._search = LocalSearch(self, damped)
 
     @property
     def arm_angle(self) -> ArmAngle:
@@ -89,10 +88,9 @@ class Kinematics(ForwardKinematics):
             start[i] = np.clip(angle, arm.lower[i], arm.upper[i])
             clipped |= abs(start[i] - angle) > LIMIT_MARGIN
         goal = Goal(np.asarray(T_base_ee, dtype=np.float64), arm_angle, frozenset(fixed))
-        pulled = 0
+        before = self._search.iterations
         if posture is not None:
-            pull = self._search.run(goal, start, self._checked(posture))
-            start, pulled = pull.q, pull.iters
+            start = self._search.run(goal, start, self._checked(posture)).q
         found = self._search.run(goal, start)
         if posture is None:
             found = self._search.across_fold(goal, found, start) or found
@@ -104,7 +102,7 @@ class Kinematics(ForwardKinematics):
             status = Status.OK
         else:
             status = self._why_not(found, goal)
-        return IkResult(found.q, status, found.miss.position, found.miss.rotation, pulled + found.iters)
+        return IkResult(found.q, status, found.miss.position, found.miss.rotation, self._search.iterations - before)
 
     def conditioning(self, q: ArrayLike, fixed: Collection[str] = (), *, arm_angle: bool = False) -> float:
         """How far a configuration is from a singularity of what is commanded.
@@ -117,13 +115,14 @@ class Kinematics(ForwardKinematics):
         return float(np.linalg.svd(self._search.derivative(goal, self._checked(q)), compute_uv=False)[-1])
 
     def _why_not(self, attempt: Attempt, goal: Goal) -> Status:
-        q, arm = attempt.q, self.arm
-        if np.any(((q - arm.lower < LIMIT_MARGIN) | (arm.upper - q < LIMIT_MARGIN)) & self._search.free(goal)):
+        if not self.within_reach(goal.T_base_ee[:3, 3]):
+            return Status.UNREACHABLE  # stretched towards it, joints come to their limits too
+        if self._search.held_by_limit(goal, attempt):
             return Status.LIMIT
         return Status.NOT_CONVERGED if attempt.moving else Status.UNREACHABLE
 
 
 @lru_cache
-def kinematics_of(arm: Arm) -> Kinematics:
-    """The process's kinematics of an arm, built on first use."""
-    return Kinematics(arm)
+def kinematics_of(arm: Arm, damped: bool = True) -> Kinematics:
+    """The process's kinematics of an arm, built on first use; ``damped``: see :mod:`er_il.search`."""
+    return Kinematics(arm, damped)

@@ -2,14 +2,15 @@
 
 The steps are Levenberg-Marquardt's: damping that grows with the squared miss (Sugihara 2011) keeps
 them short near a singularity, where undamped ones leap to another branch of solutions, and vanishes
-as the goal is met, so that the last steps are quadratic.
+as the goal is met, so that the last steps are quadratic. Undamped, they are Gauss and Newton's, each
+taken as it comes: what a solver does that follows the Jacobian's pseudo-inverse.
 
 Where a goal determines the joints (ERJ, ERA), solutions come in pairs that meet at a singularity,
 the fold. Near it the seed may lie closer to the one of the pair that the steps did not find.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -30,6 +31,7 @@ CAUTION = 10.0  # damping grows by this factor after a step that overshot, and s
 POLISH = 1e-8  # [m and rad] solve this far: the last steps are quadratic, and near a fold joints need it
 SLOW = 0.95  # a step that leaves more of the miss than this is slow,
 PATIENCE = 6  # and so many in a row, the goal still missed, mean that it is out of reach
+LIMIT_MARGIN = 1e-4  # [rad] a joint this close to its limit is at it
 STALL = 1e-10  # [rad] a step this small changes nothing: stop early
 FOLD = 3e-2  # smallest singular value (m and rad mixed) below which another solution may lie close by
 FOLD_REACH = 0.5  # [rad] how far away that other solution is looked for
@@ -65,7 +67,6 @@ class Attempt:
 
     q: Vector  # (n,) [rad]
     miss: Miss
-    iters: int
     moving: bool  # whether it was still getting closer
 
     @property
@@ -78,9 +79,11 @@ class Attempt:
 class LocalSearch:
     """The search for one arm. Not thread-safe."""
 
-    def __init__(self, kinematics: ForwardKinematics) -> None:
+    def __init__(self, kinematics: ForwardKinematics, damped: bool) -> None:
         self.arm = kinematics.arm
         self._kinematics = kinematics
+        self._damped = damped
+        self.iterations = 0  # of all runs so far
         self._robot = placo.RobotWrapper("", placo.Flags.ignore_collisions, self.arm.model_xml)
         self._programs: dict[tuple[frozenset[str], bool, bool], PoseQp] = {}
 
@@ -101,19 +104,21 @@ class LocalSearch:
         miss = self._miss(goal, q)
         while moving and iters < limit and (posture is not None or miss.size > POLISH):
             try:
-                moved = program.step(q, caution * DAMPING_GROWTH * miss.size**2, miss.angle_row)
+                damping = caution * DAMPING_GROWTH * miss.size**2 if self._damped else 0.0
+                moved = program.step(q, damping, miss.angle_row)
             except RuntimeError:  # the QP has no solution: keep the last angles, the caller sees the miss
                 moving = False
                 break
             iters += 1
+            self.iterations += 1
             missed = self._miss(goal, moved)
             slow = slow + 1 if missed.size > max(SLOW * miss.size, POSITION_TOLERANCE) else 0
             moving = bool(np.abs(moved - q).max() >= STALL) and (posture is not None or slow < PATIENCE)
-            if posture is None and missed.size > miss.size:
+            if self._damped and posture is None and missed.size > miss.size:
                 caution *= CAUTION  # overshot: try a shorter step from the same place
             else:
                 q, miss, caution = moved, missed, max(1.0, caution / CAUTION)
-        return Attempt(q, miss, iters, moving)
+        return Attempt(q, miss, moving)
 
     def _miss(self, goal: Goal, q: Vector) -> Miss:
         pos_err, rot_err = self._kinematics.pose_error(goal.T_base_ee, q)
@@ -159,8 +164,17 @@ class LocalSearch:
         if np.linalg.norm(guess - seed) > distance + FOLD_MARGIN:
             return None
         twin = self.run(goal, guess)
-        nearer = twin.reached and np.linalg.norm(twin.q - seed) < distance
-        return replace(twin, iters=found.iters + twin.iters) if nearer else None
+        return twin if twin.reached and np.linalg.norm(twin.q - seed) < distance else None
+
+    def held_by_limit(self, goal: Goal, attempt: Attempt) -> bool:
+        """Whether a joint would have to pass its limit to come closer to the goal."""
+        q, arm = attempt.q, self.arm
+        push = self._kinematics.jacobian(q).T @ self._kinematics.pose_gap(goal.T_base_ee, q)
+        if attempt.miss.angle_row is not None:
+            gradient, change = attempt.miss.angle_row
+            push = push + gradient * change
+        at_lower, at_upper = q - arm.lower < LIMIT_MARGIN, arm.upper - q < LIMIT_MARGIN
+        return bool(np.any(((at_lower & (push < 0)) | (at_upper & (push > 0))) & self.free(goal)))
 
     def free(self, goal: Goal) -> NDArray[np.bool_]:
         """Which joints (n,) the goal lets move."""

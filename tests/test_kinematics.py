@@ -173,3 +173,50 @@ def test_random_chains_are_solved(tmp_path, joints):
         q = random_q(arm, rng, 0.2)
         solved += kinematics.solve(kinematics.fk(q), q + rng.uniform(-0.1, 0.1, joints)).status is Status.OK
     assert solved >= 39
+
+
+@pytest.mark.parametrize("redundancy", [{}, {"fixed": {"panda_joint1": 0.0}}, {"arm_angle": 0.0}])
+def test_what_is_farther_than_the_arm_is_long_is_unreachable_whatever_the_limits(redundancy):
+    """Stretched towards it the Panda's elbow is at its limit, but that limit is not the reason."""
+    for position in ([2.0, 0.0, 0.5], [0.0, -1.5, 0.3], [0.3, 0.0, 1.6]):
+        target = KINEMATICS.fk(PANDA.home)
+        target[:3, 3] = position
+        assert KINEMATICS.solve(target, PANDA.home, **redundancy).status is Status.UNREACHABLE
+
+
+def test_nothing_is_farther_than_the_arm_is_long():
+    rng = np.random.default_rng(5)
+    for name in ("panda", "panda8", "xarm7"):
+        arm = Arm.preset(name)
+        kinematics = kinematics_of(arm)
+        assert all(kinematics.within_reach(kinematics.fk(random_q(arm, rng))[:3, 3]) for _ in range(200))
+    assert not KINEMATICS.within_reach(np.array([1.2, 0.0, 0.3]))
+
+
+def test_a_limit_that_is_touched_but_not_in_the_way_is_not_named():
+    q = PANDA.home.copy()
+    q[6] = PANDA.upper[6]  # the hand's own turn
+    target = KINEMATICS.fk(q)
+    target[:3, 3] += [0.0, 0.0, -0.9]  # into the table: nothing to do with the hand's turn
+    ik = KINEMATICS.solve(target, q, fixed={"panda_joint1": 0.0})
+    assert ik.status is not Status.OK
+    held = (ik.q - PANDA.lower < 1e-4) | (PANDA.upper - ik.q < 1e-4)
+    assert (ik.status is Status.LIMIT) == bool(held[1:6].any())
+
+
+def test_damping_costs_nothing_where_it_is_easy_and_ends_nearer_to_what_cannot_be_met():
+    undamped = kinematics_of(PANDA, damped=False)
+    easy = PANDA.home + 0.1
+    for kinematics in (KINEMATICS, undamped):
+        ik = kinematics.solve(kinematics.fk(easy), PANDA.home, fixed={"panda_joint1": 0.1})
+        np.testing.assert_allclose(ik.q, easy, atol=1e-4)
+    rng = np.random.default_rng(6)
+    missed = {KINEMATICS: 0.0, undamped: 0.0}
+    for _ in range(60):
+        q = random_q(PANDA, rng, 0.05)
+        target = KINEMATICS.fk(q)
+        target[:3, 3] += rng.normal(scale=0.05, size=3)
+        for kinematics in missed:
+            ik = kinematics.solve(target, q, fixed={"panda_joint1": q[0]})
+            missed[kinematics] += (ik.pos_err + ik.rot_err) * (ik.status is not Status.OK)
+    assert missed[KINEMATICS] < 0.9 * missed[undamped]

@@ -1,14 +1,14 @@
 """What task space and the ER spaces share: an end-effector pose, then the redundancy, if any."""
 
 from abc import abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from er_il.arm import Vector
-from er_il.kinematics import IkResult, Status
+from er_il.kinematics import IkResult, Kinematics, Status, kinematics_of
 from er_il.rotation import Quaternion, RotationCode, RotationError
 from er_il.spaces.base import ActionSpace, Array, Decoded
 
@@ -17,9 +17,17 @@ POSITION_NAMES = ("ee.x", "ee.y", "ee.z")
 
 @dataclass(frozen=True, eq=False)
 class PoseSpace(ActionSpace):
-    """Position [m] and rotation of the end effector in the base frame, then redundancy values [rad]."""
+    """Position [m] and rotation of the end effector in the base frame, then redundancy values [rad].
+
+    ``damped`` says how IK steps (see :mod:`er_il.search`); it is no part of what an action means.
+    """
 
     rotation: RotationCode
+    damped: bool = field(default=True, kw_only=True)
+
+    @property
+    def kinematics(self) -> Kinematics:
+        return kinematics_of(self.arm, self.damped)
 
     @property
     @abstractmethod
