@@ -3,7 +3,7 @@
 import hashlib
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 
@@ -130,7 +130,7 @@ class Arm:
         arm._check(links)
         return arm
 
-    def _check(self, links: list[str]) -> None:
+    def _check_redundant(self) -> None:
         if strangers := [joint for joint in self.redundant if joint not in self.joints]:
             raise ArmError(f"Redundant joints {', '.join(strangers)} are not among {', '.join(self.joints)}.")
         if len(self.redundant) != self.redundancy:
@@ -138,6 +138,9 @@ class Arm:
                 f"{self.name} has {self.dof} joints, so ERJ commands {self.redundancy} of them, "
                 f"not {len(self.redundant)} ({', '.join(self.redundant)})."
             )
+
+    def _check(self, links: list[str]) -> None:
+        self._check_redundant()
         if self.home.shape != (self.dof,) or np.any(self.home < self.lower) or np.any(self.home > self.upper):
             raise ArmError(f"The home posture of {self.name} needs {self.dof} angles within the joint limits.")
         if self.angle_frames is not None:
@@ -145,6 +148,17 @@ class Arm:
             for link in (frames.shoulder, frames.elbow, frames.wrist):
                 if link not in links:
                     raise ArmError(f"{self.name} has no link {link!r}. Its links: {', '.join(links)}.")
+
+    def commanding(self, redundant: Sequence[str]) -> "Arm":
+        """Return the same arm with other joints for ERJ to command (the same object if asked again).
+
+        Args:
+            redundant: n-6 of the arm's joints.
+
+        Raises:
+            ArmError: not that many, or not the arm's.
+        """
+        return self if tuple(redundant) == self.redundant else _commanding(self, tuple(redundant))
 
     @property
     def dof(self) -> int:
@@ -180,6 +194,13 @@ class Arm:
     def __reduce__(self) -> tuple[object, ...]:
         # Plain fields only: cached values are rebuilt where the arm is unpickled.
         return (type(self), tuple(getattr(self, name) for name in self.__dataclass_fields__))
+
+
+@lru_cache
+def _commanding(arm: Arm, redundant: tuple[str, ...]) -> Arm:
+    other = replace(arm, redundant=redundant)
+    other._check_redundant()
+    return other
 
 
 def _frozen(values: ArrayLike) -> Vector:

@@ -5,8 +5,9 @@ import pytest
 from chains import chain_arm, write_chain
 
 from er_il import ActionSpace, Arm, ArmAngleFrames, Status, from_spec, make_action_space
-from er_il.errors import ArmError, ShapeError, SpecError, UnknownNameError
+from er_il.errors import ArmError, ErIlError, ShapeError, SpecError, UnknownNameError
 from er_il.round_trip import EXACT, SINGULAR, RoundTrip, round_trips
+from er_il.spaces import name_of
 from er_il.spaces.task import POSTURE_PULL
 
 PANDA = Arm.preset("panda")
@@ -255,9 +256,9 @@ def test_specs_of_other_arms_and_broken_specs_are_refused(tmp_path):
     spec = make_action_space("erj", PANDA).spec()
     for change, message in [
         ({"version": 7}, r"^Action spec has version 7; this er_il reads 1\.$"),
-        ({"arm": {**spec["arm"], "redundant": ["panda_joint3"]}}, "^The action spec is for redundant .*panda_joint3"),
+        ({"arm": {**spec["arm"], "redundant": ["panda_joint9"]}}, "^The action spec is for redundant .*panda_joint9"),
         ({"arm": {**spec["arm"], "fingerprint": "0"}}, "^The action spec is for fingerprint 0, but the arm 'panda'"),
-        ({"arm": {"name": "panda"}}, "^Action spec has no 'joints'"),
+        ({"arm": {"name": "panda"}}, "^Action spec has no .redundant."),
     ]:
         with pytest.raises(SpecError, match=message):
             from_spec({**spec, **change})
@@ -306,3 +307,33 @@ def test_posture_pulls_step_by_step_and_arrives():
     assert steps[-1] < 1e-3
     assert np.linalg.norm(q - PANDA.home) < np.linalg.norm(nearest.decode(action, q).q - PANDA.home) + 1e-3
     assert abs(q[0]) < 0.2  # home's elbow points up
+
+
+@pytest.mark.parametrize("joint", ["panda_joint3", "panda_joint5", "panda_joint7"])
+def test_erj_commands_the_joint_that_its_name_says(joint: str) -> None:
+    space = make_action_space(f"erj@{joint}", PANDA)
+    assert space.names[-2:] == (f"{joint}.pos", "gripper")
+    q = PANDA.home + 0.2
+    encoded = space.encode(q, 1.0)
+    assert encoded[-2] == pytest.approx(q[PANDA.joints.index(joint)])
+    decoded = space.decode(encoded, seed=q + 0.05)
+    assert decoded.q == pytest.approx(q, abs=1e-3)
+    again = from_spec(space.spec())
+    assert again.names == space.names
+    assert name_of(again, PANDA) == f"erj@{joint}"
+    assert name_of(make_action_space("erj", PANDA), PANDA) == "erj"
+    assert make_action_space(f"erj@{joint}", PANDA).arm is space.arm  # its kinematics are built once
+
+
+@pytest.mark.parametrize(
+    ("name", "complaint"),
+    [
+        ("task@panda_joint1", "Unknown action space 'task@panda_joint1'"),
+        ("erj@", "Unknown action space 'erj@'"),
+        ("erj@panda_joint9", "panda_joint9 are not among panda_joint1"),
+        ("erj@panda_joint1+panda_joint2", "commands 1 of them, not 2"),
+    ],
+)
+def test_a_name_with_joints_that_cannot_be_is_refused(name: str, complaint: str) -> None:
+    with pytest.raises(ErIlError, match=complaint):
+        make_action_space(name, PANDA)

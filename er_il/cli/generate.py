@@ -24,7 +24,8 @@ def generate(
 
     Args:
         task: Task, such as reach_cup.
-        spaces: Action spaces, separated by commas; they name the datasets' folders.
+        spaces: Action spaces, separated by commas: joint, task, erj, era, or erj@JOINT to command another joint.
+            They name the datasets' folders.
         episodes: Number of demonstrations.
         seed: Seed of the demonstrations.
         cameras: Cameras to record, separated by commas, such as wrist,shoulder.

@@ -21,7 +21,7 @@ def train(
 
     Args:
         task: Task, such as reach_cup.
-        space: Action space of the dataset: joint, task, erj.
+        space: Action space of the dataset: joint, task, erj, era, erj@JOINT.
         steps: Training steps; the configuration's if omitted.
         seed: Seed of the training.
         dataset: Folder of the dataset; datasets/<task>/<space> if omitted.
@@ -31,14 +31,12 @@ def train(
     import shlex
     import sys
 
-    from er_il.errors import UnknownNameError
     from er_il.policy.training import Training, default_config, default_steps
-    from er_il.spaces import SPACES
+    from er_il.spaces import check_space
     from er_il.tasks import task_id
 
     task_id(task)
-    if space not in SPACES:
-        raise UnknownNameError("action space", space, SPACES)
+    check_space(space)
     chosen = config or default_config(space)
     training = Training(
         task=task,

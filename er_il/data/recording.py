@@ -25,8 +25,8 @@ from er_il.data.layout import Layout
 from er_il.data.recipe import Recipe
 from er_il.data.record import Record
 from er_il.data.schema import ACTION, DEMO_SEED, ENVIRONMENT_STATE, IMAGES, LEADER_JOINTS, STATE, features
-from er_il.errors import DatasetError, UnknownNameError
-from er_il.spaces import SPACES, ActionSpace, make_action_space
+from er_il.errors import DatasetError
+from er_il.spaces import ActionSpace, check_space, make_action_space
 
 # LeRobot's encoder drops frames when its queue is full, as a live camera's must be; ours can wait.
 _QUEUE_SIZE = 1_000_000
@@ -60,9 +60,9 @@ def generate(recipe: Recipe, spaces: Sequence[str], out: Path, progress: Progres
     """
     asked = tuple(dict.fromkeys(spaces))
     for space in asked or ("",):
-        if space not in SPACES:
-            raise UnknownNameError("action space", space, SPACES)
-    existing = [space for space in SPACES if (out / space).exists()]
+        check_space(space)
+        make_action_space(space, Arm.preset(recipe.arm))  # raises if the arm has none such
+    existing = sorted(info.parents[1].name for info in out.glob("*/meta/info.json"))
     for space in existing:
         _check_same(recipe, Record.read(out / space).recipe, out / space)
     new = tuple(space for space in asked if space not in existing)

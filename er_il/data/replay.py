@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from er_il.arm import Arm
 from er_il.data.recipe import Recipe
 from er_il.data.record import Record, Recorded, read_episodes, read_spec
 from er_il.errors import DatasetError
@@ -20,7 +21,7 @@ from er_il.policy.decoders import DECODERS, decoder
 from er_il.policy.decoding_env import DecodingEnv, make_decoding_env
 from er_il.policy.outcomes import summarise
 from er_il.rotation import Quaternion
-from er_il.spaces import from_spec
+from er_il.spaces import from_spec, name_of
 from er_il.tasks import task_id
 from er_il.workers import worker_pool
 
@@ -156,9 +157,10 @@ class _Play:
 
 def _plays(dataset: Path) -> list[_Play]:
     spec, recipe = read_spec(dataset), Record.read(dataset).recipe
-    from_spec(spec)  # refuses what this version would decode differently
+    name = name_of(from_spec(spec), Arm.preset(recipe.arm))  # refuses what this version would decode differently
     rotation = spec.get("rotation", Quaternion.kind)
-    return [_Play(recipe, name, rotation) for name, each in DECODERS.items() if each.space == spec["space"]]
+    readers = [key for key, each in DECODERS.items() if each.space == name] or [name]
+    return [_Play(recipe, reader, rotation) for reader in readers]
 
 
 @dataclass

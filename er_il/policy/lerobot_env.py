@@ -24,8 +24,9 @@ class ErIlEnvConfig(EnvConfig):
     """A simulated task whose actions are encoded in an action space.
 
     Attributes:
-        action_space: ``joint``, ``task``, ``erj``.
+        action_space: ``joint``, ``task``, ``erj``, ``era``, or ``erj@<joint>`` if ERJ commands another joint.
         resolution: What IK does with the freedom that task space leaves: ``nearest`` or ``posture``.
+        posture: Joint angles [rad] to which ``posture`` pulls; the arm's comfortable ones if empty.
         rotation: ``quat`` or ``rot6d``, as in the dataset that the policy was trained on.
         arm: Name of the arm.
         on_invalid: What the arm does with an invalid action: ``best_effort``, ``hold``, ``stop``.
@@ -37,6 +38,7 @@ class ErIlEnvConfig(EnvConfig):
     fps: int = 20
     action_space: str = "erj"
     resolution: str = NEAREST
+    posture: list[float] = field(default_factory=list)
     rotation: str = "quat"
     arm: str = "panda"
     on_invalid: str = BEST_EFFORT
@@ -69,7 +71,7 @@ class ErIlEnvConfig(EnvConfig):
     @property
     def decoder(self) -> Decoder:
         """The decoder that the options name."""
-        return Decoder(self.action_space, self.resolution)
+        return Decoder(self.action_space, self.resolution, tuple(self.posture))
 
     def create_envs(self, n_envs: int, use_async_envs: bool = False) -> dict[str, dict[int, VectorEnv]]:
         # LeRobot's own commands tell an environment nothing about the policy it will meet, but

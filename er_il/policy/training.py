@@ -14,10 +14,11 @@ import yaml
 
 from er_il.data.recipe import TRAIN
 from er_il.data.schema import IMAGES, action_spec
-from er_il.errors import DatasetError, PolicyError, UnknownNameError
+from er_il.errors import DatasetError, PolicyError
 from er_il.policy.contract import Contract, dataset_info
 from er_il.resources import data_dir
-from er_il.spaces import SPACES
+from er_il.spaces import check_space, split_name
+from er_il.workers import end_with_parent
 
 STOCK = "lerobot-train"
 # With two threads on two cores, a step of these small policies takes ten times as long as with one.
@@ -41,17 +42,21 @@ class Training:
     config: Path
     steps: int
     seed: int
+    demonstrations: int | None = None  # the first ones of the dataset's training episodes; all if None
 
     def __post_init__(self) -> None:
-        if self.space not in SPACES:
-            raise UnknownNameError("action space", self.space, SPACES)
+        check_space(self.space)
         if self.steps < 1:
             raise PolicyError(f"{self.steps} training steps train nothing; ask for at least one.")
         if not self.config.is_file():
             raise PolicyError(f"There is no training configuration {self.config}.")
         spec = action_spec(dataset_info(self.dataset)["features"])
-        if spec["space"] != self.space:
-            raise DatasetError(f"The dataset at {self.dataset} holds {spec['space']} actions, not {self.space}.")
+        kind, joints = split_name(self.space)
+        if spec["space"] != kind:
+            raise DatasetError(f"The dataset at {self.dataset} holds {spec['space']} actions, not {kind}.")
+        if joints and tuple(spec["arm"]["redundant"]) != joints:
+            commanded = ", ".join(spec["arm"]["redundant"])
+            raise DatasetError(f"The dataset at {self.dataset} commands {commanded}, not {', '.join(joints)}.")
 
     @property
     def command(self) -> list[str]:
@@ -67,7 +72,7 @@ class Training:
             f"--config_path={self.config}",
             f"--dataset.repo_id=er_il/{self.task}_{self.space}",
             f"--dataset.root={self.dataset}",
-            f"--dataset.episodes={json.dumps(_train_episodes(info), separators=(',', ':'))}",
+            f"--dataset.episodes={json.dumps(self._episodes(info), separators=(',', ':'))}",
             f"--policy.tags={json.dumps([contract.tag])}",
             *([f"--policy.input_features={json.dumps(inputs)}"] if inputs else []),
             f"--output_dir={self.out}",
@@ -115,7 +120,17 @@ class Training:
         self.clear()
         command = [str(Path(sys.executable).parent / self.command[0]), *self.command[1:]]  # need not be on the PATH
         environment = ONE_THREAD | os.environ
-        return subprocess.run(command, env=environment, stdout=output, stderr=output, check=False).returncode
+        return subprocess.run(
+            command, env=environment, stdout=output, stderr=output, check=False, preexec_fn=end_with_parent
+        ).returncode
+
+    def _episodes(self, info: Mapping[str, Any]) -> list[int]:
+        episodes = train_episodes(info)
+        if self.demonstrations is not None and not 1 <= self.demonstrations <= len(episodes):
+            raise DatasetError(
+                f"Of {len(episodes)} training episodes, {self.demonstrations} cannot be taken to train on."
+            )
+        return episodes[: self.demonstrations]
 
     @property
     def _checkpoint(self) -> Path | None:
@@ -134,7 +149,7 @@ class Training:
 
 def default_config(space: str) -> Path:
     """Return the configuration that ships for a space, state-based."""
-    return data_dir("configs") / f"act_{space}.yaml"
+    return data_dir("configs") / f"act_{split_name(space)[0]}.yaml"
 
 
 def default_steps(config: Path) -> int:
@@ -188,8 +203,12 @@ def pretrained(path: Path) -> Path:
     raise PolicyError(f"No policy at {path}: neither it nor a checkpoint inside has a config.json.")
 
 
-def _train_episodes(info: dict[str, object]) -> list[int]:
-    """Read the training episodes off a dataset's splits, such as ``{"train": "0:32"}``."""
+def train_episodes(info: Mapping[str, Any]) -> list[int]:
+    """Read the training episodes off a dataset's splits, such as ``{"train": "0:32"}``.
+
+    Raises:
+        DatasetError: the dataset names none.
+    """
     splits = info.get("splits")
     try:
         assert isinstance(splits, dict)

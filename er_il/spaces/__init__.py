@@ -1,6 +1,7 @@
 """The action spaces: joint, task and the paper's redundancy-aware ER family, absolute or as deltas."""
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -22,8 +23,11 @@ __all__ = [
     "DeltaBounds",
     "DeltaSpace",
     "JointSpace",
+    "check_space",
     "from_spec",
     "make_action_space",
+    "name_of",
+    "split_name",
 ]
 
 
@@ -63,8 +67,11 @@ SPACES: dict[str, Callable[[Arm, RotationCode, Vector | None], ActionSpace]] = {
 }
 
 
+AT, AND = "@", "+"  # as in erj@panda_joint3, or erj@panda_joint1+panda_joint3 with two redundant joints
+
+
 def make_action_space(
-    kind: str,
+    name: str,
     arm: Arm,
     *,
     rotation: str = "quat",
@@ -74,7 +81,8 @@ def make_action_space(
     """Build an action space by name.
 
     Args:
-        kind: ``joint``, ``task``, ``erj`` or ``era``; with ``delta_`` in front, changes of its commands.
+        name: ``joint``, ``task``, ``erj`` or ``era``; with ``delta_`` in front, changes of its commands.
+            ``erj@<joint>`` commands another than the arm's default joint; several are joined by ``+``.
         arm: The arm it commands.
         rotation: ``quat`` or ``rot6d``; the quaternion's hemisphere is that of the arm's home pose.
             Deltas always use a rotation vector.
@@ -82,12 +90,40 @@ def make_action_space(
         bounds: Largest changes of a delta space.
 
     Raises:
-        UnknownNameError: unknown kind or rotation.
-        ArmError: an ER space for an arm without redundancy, or ERA without the arm's angle frames.
+        UnknownNameError: unknown name or rotation.
+        ArmError: an ER space for an arm without redundancy, ERA without the arm's angle frames, or joints that
+            the arm does not have.
     """
+    kind, joints = split_name(name)
+    arm = arm.commanding(joints) if joints else arm
     code = make_rotation(rotation, kinematics_of(arm).fk(arm.home)[:3, :3])
     space = _absolute(kind)(arm, code, posture)
     return make_delta_space(space, bounds) if kind.startswith(PREFIX) else space
+
+
+def split_name(name: str) -> tuple[str, tuple[str, ...]]:
+    """Split a space's name into its kind and the joints that it says ERJ commands, () if it says nothing.
+
+    Raises:
+        UnknownNameError: no such kind, or joints for a kind that commands none.
+    """
+    kind, at, joints = name.partition(AT)
+    _absolute(kind)
+    if at and (kind.removeprefix(PREFIX) != ErjSpace.kind or not joints):
+        raise UnknownNameError("action space", name, [*SPACES, f"erj{AT}JOINT"])
+    return kind, tuple(joints.split(AND)) if at else ()
+
+
+def check_space(name: str) -> None:
+    """Raise an :class:`UnknownNameError` unless a name is that of an absolute space."""
+    if split_name(name)[0] not in SPACES:
+        raise UnknownNameError("action space", name, SPACES)
+
+
+def name_of(space: ActionSpace, arm: Arm) -> str:
+    """Name a space as :func:`make_action_space` would make it for ``arm``."""
+    commands_others = space.kind.removeprefix(PREFIX) == ErjSpace.kind and space.arm.redundant != arm.redundant
+    return space.kind + (AT + AND.join(space.arm.redundant) if commands_others else "")
 
 
 def _absolute(kind: str) -> Callable[[Arm, RotationCode, Vector | None], ActionSpace]:
@@ -113,6 +149,8 @@ def from_spec(spec: Mapping[str, Any], arm: Arm | None = None, *, posture: Vecto
     try:
         described, kind = spec["arm"], spec["space"]
         arm = arm if arm is not None else Arm.preset(described["name"])
+        with suppress(ArmError):  # an arm without those joints is told below what differs
+            arm = arm.commanding(described["redundant"])
         rotation: RotationCode = make_rotation(
             spec.get("rotation", Quaternion.kind), kinematics_of(arm).fk(arm.home)[:3, :3]
         )
