@@ -7,7 +7,9 @@ import av
 import numpy as np
 import pytest
 from matplotlib.image import imread
+from PIL import Image
 
+from er_il.showcase.animation import PAUSE, WIDTH, Panel, write_animation
 from er_il.showcase.pictures import Row, moments, write_film, write_strip
 from er_il.showcase.report import CHART, success_table, write_page
 
@@ -50,11 +52,20 @@ def test_the_table_holds_every_count() -> None:
 
 def test_the_page_is_rendered_from_the_json(tmp_path: Path) -> None:
     (tmp_path / "report.json").write_text(json.dumps({"meta": META, "cells": CELLS}))
-    write_page(tmp_path, "A title", "What was done.", {"The strip": "strip.png", "A film": "erj.mp4"})
+    write_page(
+        tmp_path, "A title", "What was done.", {"The strip": "strip.png", "All": "all.webp", "A film": "erj.mp4"}
+    )
     page = (tmp_path / "report.md").read_text()
     for line in success_table(CELLS).splitlines():
         assert line in page
-    for text in ("0123abc", "rollouts: 50", "![The strip](strip.png)", "[A film](erj.mp4)", f"]({CHART})"):
+    for text in (
+        "0123abc",
+        "rollouts: 50",
+        "![The strip](strip.png)",
+        "![All](all.webp)",
+        "[A film](erj.mp4)",
+        f"]({CHART})",
+    ):
         assert text in page
     assert imread(tmp_path / CHART).std() > 0.05
 
@@ -66,6 +77,27 @@ def test_a_film_has_every_picture(tmp_path: Path) -> None:
     assert len(frames) == 12
     assert [frame.mean() for frame in frames] == pytest.approx([10 * i for i in range(12)], abs=4)
     assert [path.name for path in (tmp_path / "new").iterdir()] == ["film.mp4"]
+
+
+def test_an_animation_plays_films_side_by_side_and_marks_how_each_ends(tmp_path: Path) -> None:
+    long, short = tmp_path / "long.mp4", tmp_path / "short.mp4"
+    write_film(pictures(9), long, rate=10)
+    write_film(pictures(5), short, rate=10)
+    panels = [Panel("ERJ", "success", True, long), Panel("Task", "collision", False, short)]
+    write_animation(panels, tmp_path / "all.webp")
+    greys, borders, times = [], [], []
+    with Image.open(tmp_path / "all.webp") as animation:
+        width, height = animation.size
+        for at in range(animation.n_frames):  # pyright: ignore[reportAttributeAccessIssue]
+            animation.seek(at)
+            picture = np.asarray(animation.convert("RGB")).astype(int)
+            times.append(animation.info["duration"])
+            greys.append([picture[height // 2, x].mean() for x in (WIDTH // 2, width - WIDTH // 2)])
+            borders.append([np.ptp(picture[height // 2, x]) > 40 for x in (1, width - 2)])
+    assert times == [100] * 8 + [PAUSE]
+    assert np.array(greys) == pytest.approx(np.array([[10 * t, 10 * min(t, 4)] for t in range(9)]), abs=6)
+    assert borders == [[t >= 8, t >= 4] for t in range(9)]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["all.webp", "long.mp4", "short.mp4"]
 
 
 def test_moments_go_from_the_first_to_the_last() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 REPORT, CHART, PAGE = "report.json", "success.png", "report.md"
+PICTURES = (".png", ".webp")  # shown on the page; other files are linked
 LABELS = {
     "joint": "Joint",
     "erj": "ERJ",
@@ -81,8 +82,8 @@ def write_page(folder: Path, title: str, introduction: str, pictures: Mapping[st
     report = json.loads((folder / REPORT).read_text())
     cells, meta = report["cells"], report["meta"]
     write_chart(cells, folder / CHART)
-    shown = [f"![{caption}]({name})\n\n*{caption}*" for caption, name in pictures.items() if name.endswith(".png")]
-    links = [f"- [{caption}]({name})" for caption, name in pictures.items() if not name.endswith(".png")]
+    shown = [f"![{caption}]({name})\n\n*{caption}*" for caption, name in pictures.items() if name.endswith(PICTURES)]
+    links = [f"- [{caption}]({name})" for caption, name in pictures.items() if not name.endswith(PICTURES)]
     versions = ", ".join(f"{name} {version}" for name, version in meta["versions"].items())
     settings = [
         f"- {key.replace('_', ' ')}: {value}"
