@@ -13,14 +13,14 @@ PACKAGES = ("lerobot_env_er_il", "lerobot", "torch", "mujoco", "placo", "pin", "
 def provenance() -> dict[str, Any]:
     """Describe the code, its packages and the machine, as JSON."""
     return {
-        "git": _git_sha(),
+        "git": git_sha(),
         "versions": {"python": platform.python_version()}
         | {name: importlib.metadata.version(name) for name in PACKAGES},
         "machine": {"system": platform.platform(), "processor": _processor(), "cores": os.cpu_count()},
     }
 
 
-def _git_sha() -> str:
+def git_sha() -> str:
     """Commit of the checkout, marked where it was changed; empty outside of one."""
     folder = Path(__file__).resolve().parent
     command = ["git", "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]

@@ -1,7 +1,7 @@
 """A trained policy with its processors, and the environment it was trained for."""
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,7 +27,9 @@ from er_il.rotation import Quaternion
 POLICY_ROWS = 25
 
 
-def environment_of(policy: Path, task: str, decoder_name: str, on_invalid: str = BEST_EFFORT) -> ErIlEnvConfig:
+def environment_of(
+    policy: Path, task: str, decoder_name: str, on_invalid: str = BEST_EFFORT, posture: Sequence[float] = ()
+) -> ErIlEnvConfig:
     """Build the environment that a policy needs: its rotation code, its cameras."""
     chosen = decoder(decoder_name)
     contract = policy_contract(policy)
@@ -37,6 +39,7 @@ def environment_of(policy: Path, task: str, decoder_name: str, on_invalid: str =
         task=task,
         action_space=chosen.space,
         resolution=chosen.resolution,
+        posture=list(posture),
         rotation=Quaternion.kind if contract.rotation == NONE else contract.rotation,
         on_invalid=on_invalid,
         cameras=[key.removeprefix(f"{OBS_IMAGES}.") for key in images],

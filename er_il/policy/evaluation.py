@@ -1,7 +1,7 @@
 """Rollouts of a trained policy through a decoder, batched, and what they amount to."""
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from er_il.command import BEST_EFFORT
 from er_il.errors import ErIlError
 from er_il.kinematics import Status
 from er_il.policy.actor import POLICY_ROWS, Actor, environment_of
+from er_il.policy.elbow import ElbowReference
 from er_il.policy.outcomes import summarise
 
 FIRST_SEED = 1000  # LeRobot's own; demonstrations use seeds from a million up
@@ -31,6 +32,7 @@ class Episode:
     statuses: Counter[str]  # of decoding, one a step
     latencies: tuple[float, ...]  # [s] of decoding, one a step
     joint_step: float  # [rad] largest joint change that a decoded action asked for
+    elbow_error: float | None = None  # [m] see :class:`er_il.policy.elbow.ElbowReference`; None: not measured
 
     @property
     def steps(self) -> int:
@@ -59,10 +61,13 @@ class Cell:
     def report(self) -> dict[str, Any]:
         """Return the cell as JSON."""
         latencies = np.concatenate([episode.latencies for episode in self.episodes])
+        elbow_errors = [episode.elbow_error for episode in self.episodes if episode.elbow_error is not None]
+        measured = {"elbow_error": float(np.mean(elbow_errors))} if elbow_errors else {}
         return summarise(self.task, self.decoder, self.episodes) | {
             "decode_p50_ms": 1e3 * float(np.percentile(latencies, 50)),
             "decode_p99_ms": 1e3 * float(np.percentile(latencies, 99)),
             "mean_steps": len(latencies) / len(self.episodes),
+            **measured,
         }
 
 
@@ -74,6 +79,8 @@ def evaluate(
     episodes: int = 50,
     seed: int = FIRST_SEED,
     on_invalid: str = BEST_EFFORT,
+    posture: Sequence[float] = (),
+    elbow: ElbowReference | None = None,
     batch_size: int = POLICY_ROWS,
     advance: Callable[[int], None] = lambda episodes: None,
 ) -> Cell:
@@ -86,6 +93,8 @@ def evaluate(
         episodes: Number of rollouts.
         seed: Seed of the first one; the same seed is the same initial state for every decoder.
         on_invalid: See :class:`er_il.command.Commander`.
+        posture: (n,) [rad] to which ``task-posture`` pulls; the arm's comfortable one if empty.
+        elbow: What to measure the elbow against, if anything.
         batch_size: Environments side by side, up to ``POLICY_ROWS``; it changes no result, unless the policy
             draws random numbers, as Diffusion does.
         advance: Called with the number of episodes just finished.
@@ -99,7 +108,7 @@ def evaluate(
         raise ErIlError(f"{episodes} episodes say nothing; ask for at least one.")
     if not 1 <= batch_size <= POLICY_ROWS:
         raise ErIlError(f"The batch size is {batch_size}; it must be between 1 and {POLICY_ROWS}.")
-    config = environment_of(policy, task, decoder_name, on_invalid)
+    config = environment_of(policy, task, decoder_name, on_invalid, posture)
     actor = Actor.load(policy, config)
     threads = torch.get_num_threads()
     torch.set_num_threads(1)  # rounding depends on the number of threads, too
@@ -109,7 +118,7 @@ def evaluate(
         done: list[Episode] = []
         while len(done) < episodes:
             seeds = list(range(seed + len(done), seed + min(len(done) + vector.num_envs, episodes)))
-            done += _rollout(vector, actor, seeds)
+            done += _rollout(vector, actor, seeds, elbow)
             advance(len(seeds))
     finally:
         vector.close()
@@ -117,7 +126,7 @@ def evaluate(
     return Cell(task, decoder_name, tuple(done))
 
 
-def _rollout(vector: SyncVectorEnv, actor: Actor, seeds: list[int]) -> list[Episode]:
+def _rollout(vector: SyncVectorEnv, actor: Actor, seeds: list[int], elbow: ElbowReference | None) -> list[Episode]:
     """Run one episode a seed, side by side, until the last has ended."""
     n = vector.num_envs
     # An environment without a seed of its own repeats the last: its outcome is dropped.
@@ -127,7 +136,10 @@ def _rollout(vector: SyncVectorEnv, actor: Actor, seeds: list[int]) -> list[Epis
     description = vector.get_attr("task_description")[0]
     done = np.zeros(n, dtype=bool)
     success, failure = np.zeros(n, dtype=bool), [""] * n
+    paths: list[list[np.ndarray]] = [[] for _ in seeds]  # of the joints, with the hand's pose behind them
     while not done.all():
+        for i in np.flatnonzero(~done[: len(seeds)]):
+            paths[i].append(observation["agent_pos"][i].copy())
         observation, _, terminated, truncated, info = vector.step(actor.act(observation, description)[:n])
         for i in np.flatnonzero(~done):
             success[i] = info["is_success"][i]
@@ -142,6 +154,7 @@ def _rollout(vector: SyncVectorEnv, actor: Actor, seeds: list[int]) -> list[Epis
             statuses=Counter(map(str, tallies[i].statuses.elements())),
             latencies=tuple(tallies[i].latencies),
             joint_step=tallies[i].largest_step,
+            elbow_error=elbow.error(np.array(paths[i], dtype=np.float64)[:, : elbow.arm.dof]) if elbow else None,
         )
         for i, seed in enumerate(seeds)
     ]

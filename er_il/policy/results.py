@@ -3,7 +3,7 @@
 import csv
 import json
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +18,10 @@ def write_cells(cells: Sequence[Cell], meta: dict[str, Any], folder: Path) -> No
     _write(folder / "episodes.csv", lambda path: _write_csv(cells, path))
 
 
-def save_cell(cell: Cell, path: Path) -> None:
-    """Write a cell with all its episodes, for :func:`load_cell`."""
+def save_cell(cell: Cell, path: Path, notes: Mapping[str, Any] | None = None) -> None:
+    """Write a cell with all its episodes, for :func:`load_cell`, and notes (JSON) on how it came about."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    data = vars(cell) | {"episodes": [vars(episode) for episode in cell.episodes]}
+    data = vars(cell) | {"episodes": [vars(episode) for episode in cell.episodes], "notes": notes or {}}
     _write(path, lambda partial: partial.write_text(json.dumps(data)))
 
 

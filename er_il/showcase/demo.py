@@ -5,30 +5,26 @@ goes on where it was. Training and rollouts run side by side, one thread each.
 """
 
 import json
-import os
-import re
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from rich.progress import Progress, TaskID
+from rich.progress import Progress
 
 from er_il.data.recipe import Recipe
 from er_il.data.recording import generate
 from er_il.errors import ErIlError, RenderError
-from er_il.policy.actor import POLICY_ROWS
 from er_il.policy.decoders import decoder
-from er_il.policy.evaluation import FIRST_SEED, Cell, evaluate
-from er_il.policy.results import load_cell, save_cell
-from er_il.policy.training import Training, default_config, default_steps
+from er_il.policy.evaluation import FIRST_SEED, Cell
+from er_il.policy.jobs import RollOut, Train, roll_outs, steps_of
+from er_il.policy.results import load_cell
+from er_il.schedule import Schedule
 from er_il.showcase.showing import film_rollouts, telling_seed, write_report
 from er_il.tasks import task_id
-from er_il.workers import worker_pool
+from er_il.workers import LocalExecutor
 
 TASK = "reach_cup"
 DECODERS = ("joint", "erj", "task-nearest", "task-posture")
 ROLLOUTS = 50
-POLL = 0.5  # [s] between looks at the trainings' logs
 
 INTRODUCTION = (
     "The same demonstrations of a scripted leader arm, encoded in each action space; one Action Chunking Transformer "
@@ -36,8 +32,6 @@ INTRODUCTION = (
     "demonstration had. The two task decoders run the same policy: they differ in what inverse kinematics does with "
     "the elbow that a task-space action leaves open."
 )
-
-_LOGGED_STEP = re.compile(r"step:([\d.]+)(K?)")  # as lerobot-train logs it
 
 
 @dataclass(frozen=True)
@@ -68,18 +62,14 @@ class Demo:
         """Folder of a space's dataset."""
         return self.out / "datasets" / self.task / space
 
-    def training(self, space: str) -> Training:
+    def training(self, space: str) -> Train:
         """The training of a space's policy."""
-        config = default_config(space)
-        return Training(
-            task=self.task,
-            space=space,
-            dataset=self.dataset(space),
-            out=self.out / "policies" / self.task / space,
-            config=config,
-            steps=self.steps or default_steps(config),
-            seed=self.seed,
-        )
+        out = self.out / "policies" / self.task / space
+        return Train(self.task, space, self.dataset(space), out, steps_of(space, self.steps), self.seed)
+
+    def rolling_out(self, name: str) -> list[RollOut]:
+        """The rollouts of a decoder."""
+        return roll_outs(self.training(decoder(name).space), name, self.rollouts, self.out / "rollouts" / name)
 
     def claim(self) -> None:
         """Make the folder this run's own.
@@ -108,12 +98,12 @@ class Demo:
             recipe = recipe.resized(self.demonstrations)
         generate(recipe, self.spaces, self.out / "datasets" / self.task, progress, workers)
         # All trainings at once, be they more than the cores: in turns, a core would idle beside the last.
-        with worker_pool(max(workers, len(self.spaces)), _one_thread) as pool:
-            _Schedule(self, pool, progress).run()
+        with LocalExecutor(max(workers, len(self.spaces))) as executor:
+            self._train_and_roll_out(executor, progress)
             cells = [self._cell(name) for name in self.decoders]
-            policies = {name: self.training(decoder(name).space).policy for name in self.decoders}
+            policies = {name: self.training(decoder(name).space).training.policy for name in self.decoders}
             try:
-                pictures = film_rollouts(pool, progress, policies, self.task, telling_seed(cells), self.out)
+                pictures = film_rollouts(executor, progress, policies, self.task, telling_seed(cells), self.out)
             except RenderError as error:
                 progress.console.print(f"No films and pictures: {error}", highlight=False)
                 pictures = {}
@@ -128,84 +118,23 @@ class Demo:
         write_report(cells, meta, self.out, INTRODUCTION, pictures)
         return cells
 
-    def chunks(self, name: str) -> list[tuple[Path, int, int]]:
-        """The rollouts of a decoder in jobs: where the result goes, the first seed, how many."""
-        folder = self.out / "rollouts"
-        return [
-            (folder / f"{name}-{start}.json", FIRST_SEED + start, min(POLICY_ROWS, self.rollouts - start))
-            for start in range(0, self.rollouts, POLICY_ROWS)
-        ]
+    def _train_and_roll_out(self, executor: LocalExecutor, progress: Progress) -> None:
+        jobs = {name: self.rolling_out(name) for name in self.decoders}
+        schedule = Schedule(job for name in self.decoders for job in jobs[name])
+        trainings = [self.training(space) for space in self.spaces]
+        training_bars = [progress.add_task(f"Train {each.space}", total=each.steps) for each in trainings]
+        bars = {name: progress.add_task(f"Roll out {name}", total=self.rollouts) for name in self.decoders}
+
+        def watch() -> None:
+            for training, bar in zip(trainings, training_bars, strict=True):
+                progress.update(bar, completed=training.steps if training.done else training.logged_steps)
+            for name, bar in bars.items():
+                progress.update(bar, completed=sum(job.count for job in jobs[name] if job in schedule.done))
+
+        schedule.run(executor, watch)
+        for message in schedule.failed.values():
+            raise ErIlError(message)
 
     def _cell(self, name: str) -> Cell:
-        cells = [load_cell(path) for path, _, _ in self.chunks(name)]
+        cells = [load_cell(job.path) for job in self.rolling_out(name)]
         return Cell(self.task, name, tuple(episode for cell in cells for episode in cell.episodes))
-
-
-class _Schedule:
-    """Runs trainings first; as soon as a policy is there, its rollouts."""
-
-    def __init__(self, demo: Demo, pool: ProcessPoolExecutor, progress: Progress) -> None:
-        self._demo, self._pool, self._progress = demo, pool, progress
-        self._trainings: dict[Future[None], tuple[Training, TaskID]] = {}
-        self._rollouts: dict[Future[None], tuple[TaskID, int]] = {}
-        self._bars = {name: progress.add_task(f"Roll out {name}", total=demo.rollouts) for name in demo.decoders}
-
-    def run(self) -> None:
-        for space in self._demo.spaces:
-            training = self._demo.training(space)
-            bar = self._progress.add_task(f"Train {space}", total=training.steps)
-            self._trainings[self._pool.submit(_train, training)] = training, bar
-        while self._trainings or self._rollouts:
-            done, _ = wait([*self._trainings, *self._rollouts], timeout=POLL, return_when=FIRST_COMPLETED)
-            for future in done:
-                future.result()  # raises what the job raised
-                if future in self._trainings:
-                    training, bar = self._trainings.pop(future)
-                    self._progress.update(bar, completed=training.steps)
-                    self._roll_out(training)
-                else:
-                    bar, count = self._rollouts.pop(future)
-                    self._progress.advance(bar, count)
-            for training, bar in self._trainings.values():
-                self._progress.update(bar, completed=_logged_steps(training))
-
-    def _roll_out(self, training: Training) -> None:
-        for name in self._demo.decoders:
-            if decoder(name).space == training.space:
-                for path, seed, count in self._demo.chunks(name):
-                    job = self._pool.submit(_evaluate, training.policy, self._demo.task, name, seed, count, path)
-                    self._rollouts[job] = self._bars[name], count
-
-
-def _one_thread() -> None:
-    # More threads than cores make the small matrices of these policies ten times slower.
-    os.environ["OMP_NUM_THREADS"] = "1"
-
-
-def _train(training: Training) -> None:
-    if training.finished:
-        return
-    log = _log(training)
-    log.parent.mkdir(parents=True, exist_ok=True)
-    with log.open("w") as file:
-        code = training.run(file)
-    if code:
-        raise ErIlError(f"The training of {training.space} failed; see {log}.")
-
-
-def _evaluate(policy: Path, task: str, name: str, seed: int, count: int, path: Path) -> None:
-    if not path.exists():
-        save_cell(evaluate(policy, task, name, episodes=count, seed=seed), path)
-
-
-def _log(training: Training) -> Path:
-    return training.out.with_name(f"{training.space}.log")
-
-
-def _logged_steps(training: Training) -> int:
-    """Number of steps that a running training has reported."""
-    try:
-        steps = _LOGGED_STEP.findall(_log(training).read_text())
-    except OSError:
-        return 0
-    return int(float(steps[-1][0]) * (1000 if steps[-1][1] else 1)) if steps else 0

@@ -1,7 +1,6 @@
 """What a reader of the demo sees: films, a strip, recordings and a page, from results already there."""
 
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,7 @@ from er_il.policy.evaluation import Cell
 from er_il.policy.results import write_cells
 from er_il.policy.rollout import SUCCESS, record_rollout
 from er_il.provenance import provenance
+from er_il.schedule import Executor
 from er_il.showcase.pictures import Picture, Row, moments, write_film, write_strip
 from er_il.showcase.report import write_page
 
@@ -33,7 +33,7 @@ def telling_seed(cells: Sequence[Cell]) -> int:
 
 
 def film_rollouts(
-    pool: ProcessPoolExecutor,
+    executor: Executor,
     progress: Progress,
     policies: Mapping[str, Path],
     task: str,
@@ -43,7 +43,7 @@ def film_rollouts(
     """Film one rollout a decoder on the same seed, side by side; what is there is not filmed again.
 
     Args:
-        pool: Where the rollouts run.
+        executor: Where the rollouts run.
         progress: Where to show progress.
         policies: Decoder's name to its policy.
         task: Name of the task.
@@ -59,7 +59,7 @@ def film_rollouts(
         captions[f"Rerun recording, {name}"] = f"{name}.rrd"
     if all((folder / file).exists() for file in captions.values()):
         return captions
-    jobs = [pool.submit(_film, policy, task, name, seed, folder) for name, policy in policies.items()]
+    jobs = [executor.submit(_film, policy, task, name, seed, folder) for name, policy in policies.items()]
     rows = [job.result() for job in progress.track(jobs, description="Film a rollout each")]
     write_strip(rows, folder / STRIP)
     return captions
