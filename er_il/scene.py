@@ -22,8 +22,9 @@ class Shape:
     """One coloured solid; sizes are half extents, as in MuJoCo."""
 
     name: str
-    kind: Literal["box", "sphere", "cylinder", "capsule", "mesh"]
-    size: tuple[float, ...]  # [m] box (x, y, z); sphere (radius,); cylinder, capsule (radius, half length along z)
+    kind: Literal["box", "sphere", "ellipsoid", "cylinder", "capsule", "mesh"]
+    # [m] box, ellipsoid (x, y, z); sphere (radius,); cylinder, capsule (radius, half length along z)
+    size: tuple[float, ...]
     rgba: tuple[float, float, float, float]  # in [0, 1]
     T_parent_shape: Array  # (4, 4)
     parent: str = ""  # object of the environment state that carries it; "": fixed to the arm's base

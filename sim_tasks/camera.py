@@ -39,6 +39,8 @@ SHOWCASE = "showcase"
 VIEWS = (
     # On the hand, where the Panda carries its camera; both fingertips in view.
     View("wrist", "panda_hand", (0.075, 0.0, 0.02), (0.0, 0.0, 0.15), 70, up=(1.0, 0.0, 0.0)),
+    # On the hand's other side, under it where it points forward.
+    View("wrist2", "panda_hand", (-0.075, 0.0, 0.02), (0.0, 0.0, 0.15), 70, up=(1.0, 0.0, 0.0)),
     # Over the robot's left shoulder into the workspace.
     View("shoulder", "world", (-0.10, 0.50, 1.20), (0.60, 0.0, 0.55), 58),
     # For people: the whole scene from the right.

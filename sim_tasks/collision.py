@@ -1,4 +1,6 @@
-"""Whether a configuration of the arm is clear of the furniture."""
+"""Whether a configuration of the arm is clear of what stands around it."""
+
+from collections.abc import Mapping
 
 import mujoco
 import numpy as np
@@ -20,6 +22,11 @@ class Collisions:
         self._robot = RobotModel.of(self._model, arm)
         self._obstacles = np.array([self._model.body(name).id for name in obstacles])
         self._robot_bodies = np.array(sorted(self._robot.bodies))
+
+    def place(self, poses: Mapping[str, np.ndarray]) -> None:
+        """Put free bodies where they are now: name -> qpos (7,) of its free joint."""
+        for name, qpos in poses.items():
+            self._data.joint(name).qpos = qpos
 
     def is_free(self, q: Vector) -> bool:
         """Whether the arm at q (n,) [rad], gripper open, clears the obstacles and itself."""

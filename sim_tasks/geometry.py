@@ -12,6 +12,7 @@ from er_il.scene import Shape
 KINDS: dict[int, tuple[Any, int]] = {
     int(mujoco.mjtGeom.mjGEOM_BOX): ("box", 3),
     int(mujoco.mjtGeom.mjGEOM_SPHERE): ("sphere", 1),
+    int(mujoco.mjtGeom.mjGEOM_ELLIPSOID): ("ellipsoid", 3),
     int(mujoco.mjtGeom.mjGEOM_CYLINDER): ("cylinder", 2),
     int(mujoco.mjtGeom.mjGEOM_CAPSULE): ("capsule", 2),
     int(mujoco.mjtGeom.mjGEOM_MESH): ("mesh", 0),

@@ -50,6 +50,8 @@ def _solid(shape: Shape) -> rr.AsComponents:
             return rr.Boxes3D(half_sizes=[shape.size], colors=[shape.rgba], fill_mode=solid)
         case "sphere":
             return rr.Ellipsoids3D(half_sizes=[shape.size[:1] * 3], colors=[shape.rgba], fill_mode=solid)
+        case "ellipsoid":
+            return rr.Ellipsoids3D(half_sizes=[shape.size], colors=[shape.rgba], fill_mode=solid)
         case "cylinder":
             radius, half = shape.size[:2]
             return rr.Cylinders3D(lengths=[2 * half], radii=[radius], colors=[shape.rgba], fill_mode=solid)
