@@ -20,14 +20,14 @@ from sim_tasks.motion import Keyframe, Stretch, plan_stretch
 from sim_tasks.props import PushButton
 
 BUTTON, PEDESTAL = "button", "pedestal"
-ELBOW = ("panda_link2", "panda_link3", "panda_link4", "panda_link5")  # upper arm to forearm: what may press
-HAND = ("panda_link6", "panda_link7", "panda_hand", "panda_leftfinger", "panda_rightfinger")  # what may not
+ELBOW = ("panda_link2", "panda_link3", "panda_link4", "panda_link5")  # upper arm to forearm: no other link may press
 PRESSED = 0.02  # [m] of travel from which the button counts as pressed
 DEPTH = 0.03  # [m] to which the leader presses
 HOLD = 0.5  # [s] for which it does
 PITCH = np.radians(57)  # of the hand below the horizontal
-FOLLOW = 0.5  # how far the hand goes along with the button's place, by which the elbow gets to it
-RAISED, LOW, TURN = 1.0, 2.6, 0.005  # [rad] base joint with the elbow above any button, below all, and steps between
+FOLLOW = 0.5  # how far the hand goes along with the button's place, so that the elbow comes down on its middle
+ASIDE = np.array([-0.04, 0.05, 0.03])  # [m] from there, where the hand is while the elbow swings out
+RAISED, LOW, TURN = 0.9, 2.6, 0.005  # [rad] base joint with the elbow out above any button, below all, steps between
 
 
 class PushButtonElbow(ArmTask):
@@ -41,7 +41,6 @@ class PushButtonElbow(ArmTask):
     obstacles = (PEDESTAL,)
     centre = (0.20, -0.25)
     hand = (0.50, 0.0, 0.60)  # x, y, z [m] of the hand while the elbow presses a button at the centre
-    way = (((-0.04, 0.05, 0.03), 0.9),)  # offset [m] from there and base joint [rad], before it does
     start = (0.25, -0.8, -0.25, -2.1, -0.2, 2.1, 0.9)  # the elbow up
 
     def __init__(
@@ -66,7 +65,7 @@ class PushButtonElbow(ArmTask):
         super().__init__(**kwargs)
         self._cap = {self._model.body(BUTTON).id}
         self._elbow = {self._model.body(name).id for name in ELBOW}
-        self._hand = {self._model.body(name).id for name in HAND}
+        self._others = self._robot.bodies - self._elbow
         self._pedestal = int(self._model.body(PEDESTAL).mocapid[0])
 
     @property
@@ -90,7 +89,7 @@ class PushButtonElbow(ArmTask):
         return self.travel > PRESSED and touching(self._model, self._data, self._elbow, self._cap)
 
     def _fails(self) -> str:
-        return "wrong_link" if touching(self._model, self._data, self._hand, self._cap) else ""
+        return "wrong_link" if touching(self._model, self._data, self._others, self._cap) else ""
 
     def _times_out(self) -> str:
         return "not_pressed"
@@ -99,11 +98,11 @@ class PushButtonElbow(ArmTask):
         x, y = self.object_pose(BUTTON)[:2]
         place = np.array(self.hand) + FOLLOW * np.array([x - self.centre[0], y - self.centre[1], 0.0])
         turn = rng.uniform(-self._via_range, self._via_range, 3)
-        keyframes = [Keyframe(self._hand_pose(place + offset + turn), elbow) for offset, elbow in self.way]
+        swing = Keyframe(self._hand_pose(place + ASIDE + turn), RAISED)
         pressing = self._hand_pose(place)
-        keyframes.append(Keyframe(pressing, self._pressing_elbow(pressing), straight=True))
+        press = Keyframe(pressing, self._pressing_elbow(pressing), straight=True)
         # The elbow is to touch the button, and nothing else is near.
-        path = plan_stretch(self.arm, self.joint_positions, keyframes, is_free=lambda _: True)
+        path = plan_stretch(self.arm, self.joint_positions, [swing, press], is_free=lambda _: True)
         return [Stretch(path, gripper=0.0, hold=HOLD)], rng.uniform(*self._speed_range)
 
     def _hand_pose(self, position: np.ndarray) -> np.ndarray:
