@@ -26,9 +26,11 @@ from sim_tasks.arm_task import ArmTask
 from sim_tasks.lift_cup import LiftCup
 from sim_tasks.push_button_elbow import PushButtonElbow
 from sim_tasks.reach_cup import ReachCup
+from sim_tasks.reach_remove_cup import ReachRemoveCup
+from sim_tasks.remove_cup import RemoveCup
 from sim_tasks.retrieve_bear import RetrieveBear
 
-TASKS: tuple[type[ArmTask], ...] = (ReachCup, LiftCup, PushButtonElbow, RetrieveBear)
+TASKS: tuple[type[ArmTask], ...] = (ReachCup, RemoveCup, ReachRemoveCup, LiftCup, PushButtonElbow, RetrieveBear)
 
 for _task in TASKS:
     gymnasium.register(

@@ -113,6 +113,10 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
     def _fails(self) -> str:
         """Name of what went wrong beyond repair, empty if nothing did."""
 
+    def _collision(self) -> str:
+        """Name of running into an obstacle at this moment."""
+        return "collision"
+
     @abstractmethod
     def _times_out(self) -> str:
         """Name of what was missing when the time ran out."""
@@ -191,7 +195,7 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
             not failure
             and contact_force(self._model, self._data, self._robot.bodies, self._obstacles) > COLLISION_FORCE
         ):
-            failure = "collision"
+            failure = self._collision()
         self._success_steps = self._success_steps + 1 if not failure and self._succeeds() else 0
         success = self._success_steps >= SUCCESS_STEPS
         done = success or bool(failure)

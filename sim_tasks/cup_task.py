@@ -16,12 +16,15 @@ from sim_tasks.scene import scene_spec
 CUP = "cup"
 GRASP_HEIGHT = 0.09  # [m] of the fingertips above the surface the cup stands on, at mid-stem
 PITCH = np.radians(20)  # of the hand below the horizontal
-LIFT = np.array([-0.03, 0.0, 0.025])  # [m] of the hand, from the grasp
 FREED = 0.01  # [m] of the foot above the surface
 TIPPED = np.cos(np.radians(25))  # cosine of the tilt from which a stemmed cup falls
 CLOSED = 0.5  # opening below which the gripper counts as closed
 CLEARANCE = 0.008  # [m] the leader keeps from the furniture
 GRASP_TIME = 0.5  # [s] for the fingers to close
+REST = 0.5  # [s] at the end, beyond the moment of success: a policy must not learn to stop short of it
+
+# Offset [m] of the hand from the grasp, and base joint [rad] that puts the elbow there (or any).
+Via = tuple[tuple[float, float, float], float | None]
 
 
 class CupTask(ArmTask):
@@ -29,10 +32,10 @@ class CupTask(ArmTask):
 
     objects = (CUP,)
     cup = Goblet()
-    surface: float  # z [m] on which the cup stands
+    surface: float  # z [m] on which the cup stands before a Panda
     centre: tuple[float, float]  # x, y [m] of the cup's mean place
-    # The way of the leader's hand: offset [m] from the grasp, and base joint [rad] that puts the elbow there (or any).
-    way: tuple[tuple[tuple[float, float, float], float | None], ...]
+    way: tuple[Via, ...]  # of the leader's hand to the grasp
+    way_back: tuple[Via, ...]  # with the cup
 
     def __init__(
         self,
@@ -57,20 +60,25 @@ class CupTask(ArmTask):
         self._cup_body = {self._model.body(CUP).id}
         self._was_freed = False
 
+    @property
+    def standing(self) -> float:
+        """z [m] of the foot of the cup as it stands before this arm."""
+        return self.surface + self.lift
+
     def _draw(self, rng: np.random.Generator) -> Placement:
         x, y = np.array(self.centre) + (rng.random(2) - 0.5) * self._cup_range
         return {CUP: (x, y, 0.0)}
 
     def _place(self, placement: Placement) -> None:
         x, y, yaw = placement[CUP]
-        self._data.joint(CUP).qpos = (x, y, self.surface, np.cos(yaw / 2), 0, 0, np.sin(yaw / 2))
+        self._data.joint(CUP).qpos = (x, y, self.standing, np.cos(yaw / 2), 0, 0, np.sin(yaw / 2))
         self._was_freed = False
 
     def _held(self) -> bool:
         return all(touching(self._model, self._data, {finger}, self._cup_body) for finger in self._fingers)
 
     def _freed(self) -> bool:
-        return bool(self.object_pose(CUP)[2] > self.surface + FREED)
+        return bool(self.object_pose(CUP)[2] > self.standing + FREED)
 
     def _upright(self) -> bool:
         return bool(self._data.body(CUP).xmat[8] > TIPPED)  # the cup's own z axis against the world's
@@ -80,7 +88,7 @@ class CupTask(ArmTask):
 
     def _fails(self) -> str:
         self._was_freed |= self._held() and self._freed()
-        if not self._upright() or self.object_pose(CUP)[2] < self.surface - FREED:
+        if not self._upright() or self.object_pose(CUP)[2] < self.standing - FREED:
             return "dropped" if self._was_freed else "knocked_over"
         return ""
 
@@ -104,19 +112,19 @@ class CupTask(ArmTask):
 
     def _script(self, rng: np.random.Generator) -> tuple[Sequence[Stretch], float]:
         x, y = self.object_pose(CUP)[:2]
-        grasp = np.array([x, y, self.surface + GRASP_HEIGHT])
+        grasp = np.array([x, y, self.standing + GRASP_HEIGHT])
         turn = rng.uniform(-self._via_range, self._via_range, 3)
-        keyframes = [
+        there = [
             Keyframe(self._hand(grasp + offset + (turn if i == 0 else 0.0)), elbow, straight=i > 0)
             for i, (offset, elbow) in enumerate(self.way)
         ]
-        lifted = Keyframe(self._hand(grasp + LIFT), self.way[-1][1], straight=True)
+        back = [Keyframe(self._hand(grasp + offset), elbow, straight=True) for offset, elbow in self.way_back]
         is_free = self._collisions.is_free
-        reach = plan_stretch(self.arm, self.joint_positions, keyframes, is_free)
-        lift = plan_stretch(self.arm, reach[-1], [lifted], is_free)
+        reach = plan_stretch(self.arm, self.joint_positions, there, is_free)
+        leave = plan_stretch(self.arm, reach[-1], back, is_free)
         script = [
             Stretch(reach, gripper=1.0),
             Stretch(reach[-1:], gripper=0.0, hold=GRASP_TIME),
-            Stretch(lift, gripper=0.0, hold=0.5),
+            Stretch(leave, gripper=0.0, hold=REST),
         ]
         return script, rng.uniform(*self._speed_range)

@@ -14,6 +14,7 @@ class LiftCup(CupTask):
     max_steps = 200
     stand = Stand()
     obstacles = ("stand",)
+    arms = ("panda", "panda8")
     surface = stand.height
     centre = stand.centre
     start = (0.0, -0.83, 0.0, -1.95, 0.0, 2.34, 0.785)  # above and in front of the stand, the elbow up
@@ -22,7 +23,8 @@ class LiftCup(CupTask):
         ((-0.10, 0.0, 0.01), None),
         ((0.0, 0.0, 0.0), None),
     )
+    way_back = (((-0.03, 0.0, 0.025), None),)  # lifted
 
     def _build(self, spec: mujoco.MjSpec) -> None:
-        self.stand.add(spec, "stand", "wood")
-        self.cup.add(spec, CUP, (*self.centre, self.surface), "copper")
+        self.stand.raised(self.lift).add(spec, "stand", "wood")
+        self.cup.add(spec, CUP, (*self.centre, self.standing), "copper")

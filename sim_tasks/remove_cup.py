@@ -1,0 +1,35 @@
+"""Remove Cup: the arm is inside the cabinet; take the cup by its stem and bring it out upright (paper V-B)."""
+
+import mujoco
+
+from sim_tasks.cabinet_cup import CabinetCup
+from sim_tasks.grip import firm_grip
+
+
+class RemoveCup(CabinetCup):
+    """Take the cup out of the cabinet; inside the elbow is right, and it must swing out with the hand."""
+
+    task = "remove_cup"
+    task_description = "Grasp the cup by its stem and take it out of the cabinet, upright."
+    max_steps = 180
+    start = (0.1, -0.15, -0.11, -2.093, -0.109, 3.166, 0.876)  # inside, before the stem, the elbow up
+    way = (
+        ((-0.035, 0.0, 0.012), 0.1),  # no lower: the wrist would touch the floor of the compartment
+        ((0.0, 0.0, 0.0), 0.1),
+    )
+    way_back = (
+        ((-0.03, 0.0, 0.025), 0.1),  # lifted
+        ((-0.10, 0.0, 0.03), 0.1),
+        ((-0.24, 0.0, 0.03), 1.15),  # the elbow swings out before it leans back into the wall
+        ((-0.39, 0.0, 0.04), 1.3),  # farther than success asks, so that a policy passes its border
+    )
+
+    def _build(self, spec: mujoco.MjSpec) -> None:
+        super()._build(spec)
+        firm_grip(spec)
+
+    def _succeeds(self) -> bool:
+        return super()._succeeds() and self._outside()
+
+    def _times_out(self) -> str:
+        return "not_removed" if self._held() or self._was_freed else super()._times_out()
