@@ -81,14 +81,42 @@ class ForwardKinematics:
         return float(np.linalg.norm(position - centre)) <= radius
 
     @cached_property
+    def twisting(self) -> NDArray[np.bool_]:
+        """Which joints (n,) twist the links that they join; the others bend the arm.
+
+        A joint twists if what joins it to the joint before and the one after (the base and the end
+        effector at the ends) goes along its axis rather than across.
+        """
+        names = [self._model.names[joint] for joint in self._chain]
+        order = sorted(range(len(self.arm.joints)), key=lambda i: names.index(self.arm.joints[i]))
+        q = np.zeros(self.arm.dof)
+        axes = self.jacobian(q)[3:].T
+        pin.framesForwardKinematics(self._model, self._data, self._model_q(q))
+        T_base_world = self._data.oMf[self._base].inverse()
+        ends = [np.zeros(3), T_base_world.act(self._data.oMf[self._ee].translation)]
+        origins = [T_base_world.act(self._data.oMi[joint].translation) for joint in self._chain]
+        points = np.array([ends[0], *origins, ends[1]])
+        twisting = np.empty(self.arm.dof, dtype=bool)
+        for at, i in enumerate(order):
+            links = np.diff(points[at : at + 3], axis=0)
+            along = np.abs(links @ axes[i])
+            twisting[i] = along.sum() >= np.sqrt(np.maximum((links**2).sum(axis=1) - along**2, 0.0)).sum()
+        return twisting
+
+    @cached_property
+    def _chain(self) -> list[int]:
+        """Indices in the model of the joints between base and end effector, base first."""
+        above_base = set(self._model.supports[self._model.frames[self._base].parentJoint])
+        return [j for j in self._model.supports[self._model.frames[self._ee].parentJoint] if j not in above_base]
+
+    @cached_property
     def _ball(self) -> tuple[Vector, float]:
         """First joint's origin (3,) [m] in the base frame, and the length [m] of all that follows, end to end."""
         model, data = self._model, self._data
         pin.framesForwardKinematics(model, data, np.zeros(model.nq))
-        ee = model.frames[self._ee]
-        above_base = set(model.supports[model.frames[self._base].parentJoint])
-        first, *others = [joint for joint in model.supports[ee.parentJoint] if joint not in above_base]
-        lengths = [model.jointPlacements[joint].translation for joint in others] + [ee.placement.translation]
+        first, *others = self._chain
+        lengths = [model.jointPlacements[joint].translation for joint in others]
+        lengths.append(model.frames[self._ee].placement.translation)
         centre = data.oMf[self._base].actInv(data.oMi[first].translation)
         return centre, float(sum(np.linalg.norm(length) for length in lengths))
 

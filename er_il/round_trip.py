@@ -45,15 +45,17 @@ class RoundTrip:
 def round_trips(space: ActionSpace, count: int, *, seed_error: float = 0.1, rng_seed: int = 0) -> list[RoundTrip]:
     """Sample configurations uniformly within the limits, and seeds within ``seed_error`` [rad] of each joint."""
     arm, rng = space.arm, np.random.default_rng(rng_seed)
-    trips = []
-    for _ in range(count):
-        q = rng.uniform(arm.lower, arm.upper)
-        seed = np.clip(q + rng.uniform(-seed_error, seed_error, arm.dof), arm.lower, arm.upper)
-        action = space.encode(q)
-        started = time.perf_counter()
-        decoded = space.decode(action, seed)
-        latency = time.perf_counter() - started
-        at_limit = np.any((decoded.q - arm.lower < LIMIT_MARGIN) | (arm.upper - decoded.q < LIMIT_MARGIN))
-        conditioning = space.conditioning(q) if isinstance(space, PoseSpace) else np.inf
-        trips.append(RoundTrip(q, seed, decoded, conditioning, bool(at_limit), latency))
-    return trips
+    return [round_trip(space, rng.uniform(arm.lower, arm.upper), seed_error, rng) for _ in range(count)]
+
+
+def round_trip(space: ActionSpace, q: Vector, seed_error: float, rng: np.random.Generator) -> RoundTrip:
+    """Encode a configuration (n,) [rad] and decode it from a seed within ``seed_error`` [rad] of each joint."""
+    arm = space.arm
+    seed = np.clip(q + rng.uniform(-seed_error, seed_error, arm.dof), arm.lower, arm.upper)
+    action = space.encode(q)
+    started = time.perf_counter()
+    decoded = space.decode(action, seed)
+    latency = time.perf_counter() - started
+    at_limit = np.any((decoded.q - arm.lower < LIMIT_MARGIN) | (arm.upper - decoded.q < LIMIT_MARGIN))
+    conditioning = space.conditioning(q) if isinstance(space, PoseSpace) else np.inf
+    return RoundTrip(q, seed, decoded, conditioning, bool(at_limit), latency)

@@ -15,6 +15,7 @@ from er_il.data.layout import Layout
 from er_il.data.rewriting import read_vectors
 from er_il.data.schema import STATE, Feature, dimension_names
 from er_il.data.suspicion import Evidence, suspect
+from er_il.joint_choice import stretches
 from er_il.kinematics import LIMIT_MARGIN, Status
 from er_il.rotation import Quaternion
 from er_il.round_trip import SINGULAR
@@ -92,10 +93,7 @@ class Verification:
         found = []
         for each in self.episodes:
             for arm, label in enumerate(self.arms):
-                values = each.conditioning[:, arm]
-                edges = np.flatnonzero(np.diff(np.concatenate([[False], values < SINGULAR, [False]]).astype(int)))
-                for first, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-                    found.append(Stretch(each.number, label, first, stop - 1, float(values[first:stop].min())))
+                found += [Stretch(each.number, label, *stretch) for stretch in stretches(each.conditioning[:, arm])]
         return found
 
     def report(self) -> dict[str, Any]:

@@ -1,0 +1,1 @@
+"""Studies of the action spaces: which actions are invalid, and which joints ERJ should command."""
