@@ -1,11 +1,14 @@
 """The main job end to end, small: demonstrations, trainings, rollouts, report; interrupted and resumed."""
 
 import json
+import sys
 from pathlib import Path
 
 import pytest
+from documented import documented
 from rich.progress import Progress
 
+from er_il.cli import main
 from er_il.errors import ErIlError, UnknownNameError
 from er_il.showcase.demo import Demo
 
@@ -16,10 +19,11 @@ def small(out: Path, **kwargs: object) -> Demo:
 
 
 @pytest.mark.slow
-def test_the_demo_makes_its_report_and_does_nothing_twice(tmp_path: Path) -> None:
+def test_the_demo_makes_its_report_and_does_nothing_twice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out = tmp_path / "demo"
-    with Progress(disable=True) as progress:
-        cells = small(out).run(progress, workers=2)
+    options = ["--decoders", "erj,task-nearest", "--demonstrations", "2", "--steps", "2", "--rollouts", "2"]
+    monkeypatch.setattr(sys, "argv", ["er-il", *documented("README.md", "er-il demo"), "--out", str(out), *options])
+    main()
     report = json.loads((out / "report.json").read_text())
     assert [(cell["decoder"], cell["episodes"]) for cell in report["cells"]] == [("erj", 2), ("task-nearest", 2)]
     assert report["meta"]["training_steps"] == 2
@@ -27,7 +31,7 @@ def test_the_demo_makes_its_report_and_does_nothing_twice(tmp_path: Path) -> Non
     page = (out / "report.md").read_text()
     for cell in report["cells"]:
         assert f"**{cell['successes']}/{cell['episodes']}**" in page
-    made = ["success.png", "strip.png", "episodes.csv"]
+    made = ["success.png", "strip.png", "rollouts.webp", "episodes.csv"]
     made += [f"{name}{suffix}" for name in ("erj", "task-nearest") for suffix in (".mp4", ".rrd", ".npz")]
     for name in made:
         assert (out / name).stat().st_size > 100, name
@@ -35,7 +39,8 @@ def test_the_demo_makes_its_report_and_does_nothing_twice(tmp_path: Path) -> Non
         path: path.stat().st_mtime_ns for path in (out / "policies").rglob("*.safetensors")
     }
     with Progress(disable=True) as progress:
-        assert small(out).run(progress, workers=2) == cells
+        cells = small(out).run(progress, workers=2)
+    assert [cell.report() for cell in cells] == report["cells"]
     assert all(path.stat().st_mtime_ns == at for path, at in when.items())
     with pytest.raises(ErIlError, match="holds a demo with seed 0, not 1"):
         small(out, seed=1).claim()

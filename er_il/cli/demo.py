@@ -9,6 +9,9 @@ def demo(
     seed: int = 0,
     task: str = "reach_cup",
     decoders: str = "joint,erj,task-nearest,task-posture",
+    demonstrations: int | None = None,
+    steps: int | None = None,
+    rollouts: int = 50,
 ) -> None:
     """Demonstrate a task, train a policy in each action space, roll them out and compare.
 
@@ -19,6 +22,9 @@ def demo(
         seed: Seed of the demonstrations and the trainings.
         task: Task, such as reach_cup or lift_cup.
         decoders: Decoders to compare, separated by commas: joint, erj, era, task-nearest, task-posture.
+        demonstrations: Number of demonstrations; the recipe's if omitted.
+        steps: Training steps of a policy; the configuration's if omitted.
+        rollouts: Number of rollouts of each decoder.
     """
     from rich.console import Console
 
@@ -29,7 +35,7 @@ def demo(
     from er_il.workers import cores
 
     folder = out or Path("outputs") / ("demo" if task == TASK else task)
-    run = Demo(folder, seed, task, tuple(decoders.split(",")))
+    run = Demo(folder, seed, task, tuple(decoders.split(",")), rollouts, demonstrations, steps)
     console = Console()
     with make_progress(console) as progress:
         cells = run.run(progress, cores())

@@ -11,13 +11,14 @@ from er_il.policy.results import write_cells
 from er_il.policy.rollout import SUCCESS, record_rollout
 from er_il.provenance import provenance
 from er_il.schedule import Executor
+from er_il.showcase.animation import Panel, write_animation
 from er_il.showcase.pictures import Picture, Row, moments, write_film, write_strip
-from er_il.showcase.report import write_page
+from er_il.showcase.report import LABELS, write_page
 
 FILM_EVERY = 2  # control steps a picture: shadows make each expensive
 MOMENTS = 5  # pictures of a rollout in the strip
-STRIP = "strip.png"
-COLLISION = "collision"  # the failure that a film shows best
+STRIP, ANIMATION = "strip.png", "rollouts.webp"
+COLLISION = "collision"  # how the failures begin that a film shows best
 
 
 def telling_seed(cells: Sequence[Cell]) -> int:
@@ -26,7 +27,7 @@ def telling_seed(cells: Sequence[Cell]) -> int:
     def tells(index: int) -> int:
         outcomes = [(cell.decoder.startswith("task"), cell.episodes[index]) for cell in cells]
         return sum(
-            2 * (episode.success != task) + (task and episode.failure == COLLISION) for task, episode in outcomes
+            2 * (episode.success != task) + (task and episode.failure.startswith(COLLISION)) for task, episode in outcomes
         )
 
     return cells[0].episodes[max(range(len(cells[0].episodes)), key=tells)].seed
@@ -40,7 +41,7 @@ def film_rollouts(
     seed: int,
     folder: Path,
 ) -> dict[str, str]:
-    """Film one rollout a decoder on the same seed, side by side; what is there is not filmed again.
+    """Film one rollout a decoder on the same seed, and show them side by side; what is there is not filmed again.
 
     Args:
         executor: Where the rollouts run.
@@ -48,12 +49,15 @@ def film_rollouts(
         policies: Decoder's name to its policy.
         task: Name of the task.
         seed: Seed of the initial state.
-        folder: Where ``<decoder>.mp4``, ``.rrd`` and ``.npz`` and the strip go.
+        folder: Where ``<decoder>.mp4``, ``.rrd`` and ``.npz``, the animation and the strip go.
 
     Returns:
         Caption to file name, relative to the folder.
     """
-    captions = {f"The same start (seed {seed}) through each decoder, from start to end": STRIP}
+    captions = {
+        f"The same start (seed {seed}) through each decoder": ANIMATION,
+        "The same from start to end": STRIP,
+    }
     for name in policies:
         captions[f"Film, {name}"] = f"{name}.mp4"
         captions[f"Rerun recording, {name}"] = f"{name}.rrd"
@@ -62,6 +66,16 @@ def film_rollouts(
     jobs = [executor.submit(_film, policy, task, name, seed, folder) for name, policy in policies.items()]
     rows = [job.result() for job in progress.track(jobs, description="Film a rollout each")]
     write_strip(rows, folder / STRIP)
+    panels = [
+        Panel(
+            LABELS.get(name, name).replace("\n", " "),
+            row.outcome.replace("_", " "),
+            row.success,
+            folder / f"{name}.mp4",
+        )
+        for name, row in zip(policies, rows, strict=True)
+    ]
+    write_animation(panels, folder / ANIMATION)
     return captions
 
 
