@@ -1,8 +1,10 @@
 import json
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import torch
 from lerobot.scripts import lerobot_eval, lerobot_train
 from rich.progress import Progress
 
@@ -21,6 +23,15 @@ def datasets(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("data") / "reach_cup"
     generate(RECIPE, ["joint", "erj"], out, Progress(disable=True), workers=2)
     return out
+
+
+@pytest.fixture
+def one_thread() -> Iterator[None]:
+    """As many threads as `er-il train` uses: rounding depends on them."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(threads)
 
 
 def training(datasets: Path, out: Path, **changes: object) -> Training:
@@ -69,6 +80,7 @@ def test_inputs_are_those_of_the_configuration_in_the_shapes_of_the_dataset(tmp_
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("one_thread")
 def test_from_demonstrations_to_a_rollout_with_the_stock_commands(
     datasets: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
@@ -82,6 +94,11 @@ def test_from_demonstrations_to_a_rollout_with_the_stock_commands(
     assert "--resume=true" in longer.command
     run(monkeypatch, lerobot_train.main, *longer.command[1:])
     assert (longer.done_steps, longer.finished) == (4, True)
+    in_memory = training(datasets, tmp_path / "in_memory", steps=2)
+    assert in_memory.run() == 0
+    weights = "checkpoints/000002/pretrained_model/model.safetensors"
+    assert (in_memory.out / weights).read_bytes() == (out / weights).read_bytes()
+
     config = json.loads((longer.policy / "train_config.json").read_text())
     assert config["dataset"]["episodes"] == [0, 1]
 
