@@ -72,7 +72,7 @@ def test_inputs_are_those_of_the_configuration_in_the_shapes_of_the_dataset(tmp_
     }
     with pytest.raises(PolicyError, match="Record it with --cameras"):
         input_features(images, {"observation.state": {"shape": [16]}})
-    with pytest.raises(PolicyError, match="wants observation.environment_state"):
+    with pytest.raises(PolicyError, match=r"wants observation\.environment_state"):
         input_features(default_config("erj"), {"observation.state": {"shape": [16]}})
     own = tmp_path / "own.yaml"
     own.write_text("policy: {type: act}")
