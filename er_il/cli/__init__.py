@@ -13,6 +13,7 @@ from er_il.errors import ErIlError
 # imports (torch, MuJoCo, Rerun) wait inside the functions, so that help is instant.
 COMMANDS: dict[str, str] = {
     "attach": "attach",
+    "benchmark": "benchmark",
     "circle": "circle",
     "demo": "demo",
     "doctor": "doctor",

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from er_il.cost import measured
+from er_il.cost import Cost, measured
 from er_il.data.record import read_episodes
 from er_il.data.schema import action_spec
 from er_il.errors import ErIlError
@@ -21,7 +21,7 @@ from er_il.policy.decoders import decoder
 from er_il.policy.elbow import ElbowReference
 from er_il.policy.evaluation import FIRST_SEED, evaluate
 from er_il.policy.postures import SCEPTICS
-from er_il.policy.results import save_cell
+from er_il.policy.results import save_cell, write_whole
 from er_il.policy.training import Training, default_config, default_steps, train_episodes
 from er_il.provenance import git_sha
 from er_il.schedule import Job
@@ -74,6 +74,10 @@ class Train:
         """Whether the policy is trained."""
         return self.notes.exists()
 
+    def read_notes(self) -> dict[str, Any]:
+        """Cost and origin of the trained policy."""
+        return json.loads(self.notes.read_text())
+
     @property
     def training(self) -> Training:
         """The training; the dataset must be there."""
@@ -105,7 +109,8 @@ class Train:
                     code = training.run(file)
                 if code:
                     raise ErIlError(f"lerobot-train ended with exit code {code}.")
-        _write_notes(self.notes, {"cost": asdict(cost), "git": git_sha()})
+        notes = json.dumps(_notes(cost))
+        write_whole(self.notes, lambda path: path.write_text(notes))
 
 
 @dataclass(frozen=True)
@@ -153,8 +158,7 @@ class RollOut:
                 posture=sceptic(demos.leader).tolist() if sceptic else (),
                 elbow=demos.elbow,
             )
-        notes = {"cost": asdict(cost), "git": git_sha()}
-        save_cell(replace(cell, decoder=self.decoder), self.path, notes)
+        save_cell(replace(cell, decoder=self.decoder), self.path, _notes(cost))
 
 
 def roll_outs(trained: Train, decoder_name: str, rollouts: int, folder: Path) -> list[RollOut]:
@@ -186,10 +190,8 @@ def _demos(dataset: Path, count: int | None) -> _Demos:
     return _Demos(leader, ElbowReference.of_demos(arm, 1 / info["fps"], followed))
 
 
-def _write_notes(path: Path, notes: dict[str, Any]) -> None:
-    partial = path.with_name(path.name + ".partial")
-    partial.write_text(json.dumps(notes))
-    partial.rename(path)
+def _notes(cost: Cost) -> dict[str, Any]:
+    return {"cost": asdict(cost), "git": git_sha()}
 
 
 def steps_of(space: str, steps: int | None) -> int:

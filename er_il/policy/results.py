@@ -14,15 +14,20 @@ def write_cells(cells: Sequence[Cell], meta: dict[str, Any], folder: Path) -> No
     """Write ``report.json`` and one row an episode in ``episodes.csv``."""
     folder.mkdir(parents=True, exist_ok=True)
     report = {"meta": meta, "cells": [cell.report() for cell in cells]}
-    _write(folder / "report.json", lambda path: path.write_text(json.dumps(report, indent=2) + "\n"))
-    _write(folder / "episodes.csv", lambda path: _write_csv(cells, path))
+    write_whole(folder / "report.json", lambda path: path.write_text(json.dumps(report, indent=2) + "\n"))
+    write_whole(folder / "episodes.csv", lambda path: _write_csv(cells, path))
 
 
 def save_cell(cell: Cell, path: Path, notes: Mapping[str, Any] | None = None) -> None:
     """Write a cell with all its episodes, for :func:`load_cell`, and notes (JSON) on how it came about."""
     path.parent.mkdir(parents=True, exist_ok=True)
     data = vars(cell) | {"episodes": [vars(episode) for episode in cell.episodes], "notes": notes or {}}
-    _write(path, lambda partial: partial.write_text(json.dumps(data)))
+    write_whole(path, lambda partial: partial.write_text(json.dumps(data)))
+
+
+def load_notes(path: Path) -> dict[str, Any]:
+    """Read the notes of a cell that :func:`save_cell` wrote."""
+    return json.loads(path.read_text())["notes"]
 
 
 def load_cell(path: Path) -> Cell:
@@ -55,7 +60,8 @@ def _write_csv(cells: Sequence[Cell], path: Path) -> None:
                 )
 
 
-def _write(path: Path, write: Callable[[Path], object]) -> None:
+def write_whole(path: Path, write: Callable[[Path], object]) -> None:
+    """Let ``write`` write a file under another name, and give it its own once it is whole."""
     partial = path.with_name(path.name + ".partial")
     write(partial)
     partial.rename(path)

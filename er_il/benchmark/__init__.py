@@ -1,0 +1,1 @@
+"""Tasks times decoders times seeds: a grid of independent cells, run, resumed, counted and shown."""

@@ -1,0 +1,47 @@
+"""``er-il benchmark``: a grid of tasks, decoders and training seeds, run and reported."""
+
+from pathlib import Path
+
+from tyro.conf import Positional
+
+
+def benchmark(grid: Positional[Path], *, out: Path | None = None, results: Path | None = None) -> None:
+    """Run what a grid file asks for: demonstrations, trainings and rollouts of every cell; then report.
+
+    Interrupted, the same command resumes. A cell that fails is reported and does not stop the rest. A grid
+    that is done is only reported again.
+
+    Args:
+        grid: YAML file, such as configs/table1.yaml.
+        out: Folder of everything that it makes; outputs/benchmark/<name of the grid file> if omitted.
+        results: Folder of the report; results/<name of the grid file> if omitted.
+    """
+    import sys
+
+    from rich.console import Console
+    from rich.live import Live
+
+    from er_il.benchmark.account import Account
+    from er_il.benchmark.grid import Grid
+    from er_il.benchmark.plan import Plan
+    from er_il.benchmark.report import write_results
+    from er_il.benchmark.view import View
+    from er_il.cli.table import results_table
+    from er_il.schedule import Schedule
+    from er_il.workers import LocalExecutor, cores
+
+    plan = Plan(Grid.from_file(grid), (out or Path("outputs/benchmark") / grid.stem).resolve())
+    plan.claim()
+    console = Console()
+    schedule = Schedule(plan.jobs)
+    with LocalExecutor(cores()) as executor:
+        view = View(Account(plan, schedule), schedule, executor, console)
+        with Live(view, console=console, refresh_per_second=2):
+            schedule.run(executor, view.update)
+    report = write_results(plan, results or Path("results") / grid.stem)
+    console.print(results_table(report["cells"]))
+    for message in schedule.failed.values():
+        console.print(f"Failed: {message}", style="red", highlight=False)
+    if schedule.failed:
+        console.print(f"{len(report['meta']['missing'])} cells are incomplete. The same command tries again.")
+        sys.exit(1)
