@@ -50,7 +50,7 @@ def test_a_tag_survives_the_policys_config(tmp_path: Path, kind: str):
 
 
 @pytest.mark.parametrize("kind", SPACES)
-@pytest.mark.parametrize("suffix", ["", "_images"])
+@pytest.mark.parametrize("suffix", ["", "_images", "_images_small"])
 def test_the_shipped_configurations_carry_their_tag(kind: str, suffix: str):
     text = (data_dir("configs") / f"act_{kind}{suffix}.yaml").read_text()
     assert f'tags: ["{Contract.of_space(SPACES[kind]).tag}"]' in text
