@@ -57,10 +57,6 @@ class Executor(Protocol):
         ...
 
 
-class JobFailed(ErIlError):  # noqa: N818  the failure of a job, not an error of its own kind
-    """A job that raised; the message says what and where the rest is."""
-
-
 class Schedule:
     """The jobs that targets need, as far as their results are not there yet.
 
@@ -100,7 +96,7 @@ class Schedule:
             executor: Where they run.
             watch: Called when something has changed, and every half second.
         """
-        futures: dict[Future[None], Job] = {}
+        futures: dict[Future[str], Job] = {}
         while True:
             while len(futures) < executor.workers and (job := self._next(executor.workers)):
                 self.waiting.remove(job)
@@ -110,7 +106,7 @@ class Schedule:
             if not futures:
                 return
             for future in wait(futures, timeout=POLL, return_when=FIRST_COMPLETED).done:
-                self._finish(futures.pop(future), future.exception())
+                self._finish(futures.pop(future), future)
 
     @property
     def skipped(self) -> list[Job]:
@@ -123,27 +119,33 @@ class Schedule:
         first = len(awaited) <= workers
         return min(ready, key=lambda job: (job in self._needed) != first, default=None)
 
-    def _finish(self, job: Job, error: BaseException | None) -> None:
+    def _finish(self, job: Job, future: "Future[str]") -> None:
         del self.running[job]
-        if error is None:
-            self.done.add(job)
-            return
-        if isinstance(error, BrokenExecutor):
+        try:
+            message = future.result()
+        except BrokenExecutor as error:
             self._deaths[job] = self._deaths.get(job, 0) + 1
             if self._deaths[job] < ATTEMPTS:
                 self.waiting.insert(0, job)
                 return
-        self.failed[job] = str(error) if isinstance(error, JobFailed) else f"{job.name}: its worker died. {error}"
+            message = f"its worker died {ATTEMPTS} times ({error})"
+        except Exception as error:  # the executor gave it up
+            message = f"{type(error).__name__}: {error}"
+        if message:
+            self.failed[job] = f"{job.name}: {message}"
+        else:
+            self.done.add(job)
 
 
-def perform(job: Job) -> None:
-    """Run a job where it was sent; what it raises goes to its log.
+def perform(job: Job) -> str:
+    """Run a job where it was sent.
 
-    Raises:
-        JobFailed: it failed. Not every exception survives the way back to another process; this one does.
+    Returns:
+        What went wrong in one line, which the job's log explains; "" if nothing did. As a value, for not every
+        exception survives the way back from another process.
     """
     if job.done:
-        return
+        return ""
     try:
         job.run()
     except Exception as error:
@@ -151,4 +153,5 @@ def perform(job: Job) -> None:
         with job.log.open("a") as file:
             traceback.print_exc(file=file)
         what = str(error) if isinstance(error, ErIlError) else f"{type(error).__name__}: {error}"
-        raise JobFailed(f"{job.name}: {what} (log: {job.log})") from None
+        return f"{what} (log: {job.log})"
+    return ""

@@ -5,7 +5,9 @@ from pathlib import Path
 from tyro.conf import Positional
 
 
-def benchmark(grid: Positional[Path], *, out: Path | None = None, results: Path | None = None) -> None:
+def benchmark(
+    grid: Positional[Path], *, out: Path | None = None, results: Path | None = None, ray_address: str | None = None
+) -> None:
     """Run what a grid file asks for: demonstrations, trainings and rollouts of every cell; then report.
 
     Interrupted, the same command resumes. A cell that fails is reported and does not stop the rest. A grid
@@ -15,6 +17,8 @@ def benchmark(grid: Positional[Path], *, out: Path | None = None, results: Path 
         grid: YAML file, such as configs/table1.yaml.
         out: Folder of everything that it makes; outputs/benchmark/<name of the grid file> if omitted.
         results: Folder of the report; results/<name of the grid file> if omitted.
+        ray_address: Address of a Ray cluster to run on, such as 10.0.0.5:6379, whose machines share the folder
+            ``out``; the cores of this machine if omitted.
     """
     import sys
 
@@ -22,6 +26,7 @@ def benchmark(grid: Positional[Path], *, out: Path | None = None, results: Path 
     from rich.live import Live
 
     from er_il.benchmark.account import Account
+    from er_il.benchmark.cluster import RayExecutor
     from er_il.benchmark.grid import Grid
     from er_il.benchmark.plan import Plan
     from er_il.benchmark.report import write_results
@@ -34,7 +39,7 @@ def benchmark(grid: Positional[Path], *, out: Path | None = None, results: Path 
     plan.claim()
     console = Console()
     schedule = Schedule(plan.jobs)
-    with LocalExecutor(cores()) as executor:
+    with RayExecutor(ray_address) if ray_address else LocalExecutor(cores()) as executor:
         view = View(Account(plan, schedule), schedule, executor, console)
         with Live(view, console=console, refresh_per_second=2):
             schedule.run(executor, view.update)

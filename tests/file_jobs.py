@@ -1,0 +1,81 @@
+"""Small real jobs with a file as result: simulating, failing, or killing the process that runs them."""
+
+import json
+import os
+import signal
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import gymnasium
+
+import sim_tasks  # noqa: F401  registers the tasks
+
+
+@dataclass(frozen=True)
+class FileJob:
+    """Writes what it computed from its seed and from the files it needs."""
+
+    path: Path
+    seed: int = 0
+    needs: "tuple[FileJob, ...]" = ()
+    accident: str = ""  # "fail": raises; "die": kills its process the first time
+    sleep: float = 0.0  # [s]
+
+    @property
+    def name(self) -> str:
+        return self.path.stem
+
+    @property
+    def log(self) -> Path:
+        return self.path.with_suffix(".log")
+
+    @property
+    def done(self) -> bool:
+        return self.path.exists()
+
+    @property
+    def runs(self) -> int:
+        """How often it was run."""
+        return self._started.read_text().count("\n") if self._started.exists() else 0
+
+    @property
+    def _started(self) -> Path:
+        return self.path.with_suffix(".started")
+
+    def run(self) -> None:
+        with self._started.open("a") as file:
+            file.write(f"{os.getpid()}\n")
+        if self.accident == "fail":
+            raise RuntimeError("as it was told")
+        if self.accident == "die" and self.runs == 1:
+            os.kill(os.getpid(), signal.SIGKILL)
+        time.sleep(self.sleep)
+        result = [
+            *simulated(self.seed),
+            *(number for need in self.needs for number in json.loads(need.path.read_text())),
+        ]
+        partial = self.path.with_suffix(".partial")
+        partial.write_text(json.dumps(result))
+        partial.rename(self.path)
+
+
+def simulated(seed: int) -> list[float]:
+    """Where an arm is after half a second of holding still, from an initial state of its seed."""
+    world = gymnasium.make("sim_tasks/LiftCup-v0")
+    observation, _ = world.reset(seed=seed)
+    for _ in range(10):
+        observation, *_ = world.step(observation["agent_pos"][:8])
+    world.close()
+    return observation["agent_pos"].tolist()
+
+
+def graph(folder: Path, **changes: str) -> list[FileJob]:
+    """Four jobs, two of which need the result of a fifth; ``changes`` are accidents by name."""
+    folder.mkdir(parents=True, exist_ok=True)
+
+    def job(name: str, seed: int, *needs: FileJob) -> FileJob:
+        return FileJob(folder / f"{name}.json", seed, needs, accident=changes.get(name, ""), sleep=0.2)
+
+    root = job("root", 5)
+    return [job("a", 1, root), job("b", 2, root), job("c", 3), job("d", 4)]
