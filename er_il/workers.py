@@ -5,7 +5,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -75,6 +75,35 @@ def end_with_parent() -> None:
 
 def _pool(workers: int, initializer: Callable[..., None], *arguments: object) -> ProcessPoolExecutor:
     return ProcessPoolExecutor(workers, get_context("spawn"), _start, (initializer, arguments))
+
+
+def run_jobs[T](
+    jobs: Sequence[tuple[Callable[..., T], *tuple[Any, ...]]], workers: int, advance: Callable[[int, int], object]
+) -> list[T]:
+    """Run jobs, each a function and its arguments, and return their results in order.
+
+    Args:
+        jobs: Functions of modules, and arguments that can be pickled.
+        workers: Number of worker processes; with one, no process is started.
+        advance: Called with the number of jobs done, and their total.
+    """
+    done: list[T] = []
+
+    def collect(results: Iterable[T]) -> list[T]:
+        for result in results:
+            done.append(result)
+            advance(len(done), len(jobs))
+        return done
+
+    if workers == 1:
+        return collect(function(*arguments) for function, *arguments in jobs)
+    with worker_pool(workers, _nothing) as pool:
+        running = [pool.submit(*job) for job in jobs]
+        return collect(job.result() for job in running)
+
+
+def _nothing() -> None:
+    """Prepare nothing: the jobs bring all they need."""
 
 
 def _start(initializer: Callable[..., None], arguments: tuple[object, ...]) -> None:

@@ -21,6 +21,7 @@ COMMANDS: dict[str, str] = {
     "eval": "eval",
     "generate": "generate",
     "replay": "replay",
+    "study": "study",
     "train": "train",
     "verify": "verify",
     "view": "view",

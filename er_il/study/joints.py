@@ -1,8 +1,6 @@
 """The study of ERJ's joints: every choice measured over the workspace and along demonstrations, and what follows."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor
-from contextlib import nullcontext
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -28,7 +26,7 @@ from er_il.joint_choice import (
 from er_il.kinematics import kinematics_of
 from er_il.round_trip import EXACT, SINGULAR
 from er_il.study.joint_notes import notes
-from er_il.workers import worker_pool
+from er_il.workers import run_jobs
 
 Demos = Mapping[str, Sequence[JointPath]]  # by task or dataset
 
@@ -113,11 +111,7 @@ def study_joints(arm: Arm, demos: Demos, workers: int, advance: Callable[[int, i
     jobs = [(over_workspace, arm, choice, q, over[choice]) for choice in every]
     for name, of_set in paths.items():
         jobs += [(along_demos, arm, choice, of_set, [each[choice] for each in along[name]]) for choice in every]
-    measured: list[Fitness] = []
-    with worker_pool(workers, _prepare) if workers > 1 else nullcontext() as pool:
-        for fitness in _run(pool, jobs):
-            measured.append(fitness)
-            advance(len(measured), len(jobs))
+    measured = run_jobs(jobs, workers, advance)
     sets = [dict(zip(every, measured[i : i + len(every)], strict=True)) for i in range(0, len(measured), len(every))]
     workspace, of_demos = sets[0], dict(zip(demos, sets[1:], strict=True))
     best = ranking(workspace, of_demos)[0]
@@ -128,16 +122,3 @@ def study_joints(arm: Arm, demos: Demos, workers: int, advance: Callable[[int, i
         for stretch in stretches(sensitivity[best].smallest)
     ]
     return JointStudy(arm, workspace, of_demos, tuple(near))
-
-
-def _run(pool: Executor | None, jobs: list[tuple[Any, ...]]) -> Iterator[Fitness]:
-    """Run jobs, each a function and its arguments, and yield their results in order."""
-    if pool is None:
-        yield from (measure(*arguments) for measure, *arguments in jobs)
-    else:
-        running = [pool.submit(*job) for job in jobs]
-        yield from (job.result() for job in running)
-
-
-def _prepare() -> None:
-    """Jobs bring all they need."""

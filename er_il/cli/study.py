@@ -1,0 +1,117 @@
+"""``er-il study``: what the paper asks about action spaces, measured."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+from tyro.conf import OmitArgPrefixes, Positional, subcommand
+
+REPORT = "report.json"
+
+
+def joints(
+    demos: Positional[tuple[str, ...]] = ("reach_cup",),
+    *,
+    episodes: int = 10,
+    training: Path | None = None,
+    out: Path = Path("outputs/study/joints"),
+) -> None:
+    """Which joint should ERJ command? Singularities, branch flips and round trips with each one.
+
+    Args:
+        demos: Folders of datasets of one arm, or tasks to record.
+        episodes: Demonstrations to record of a task, or to look at in a dataset.
+        training: Report of policies trained with several joints (decoders erj@<joint>), to compare the advice with.
+        out: Folder of report.json, joints.png and the recorded demonstrations.
+    """
+    from rich.console import Console
+
+    from er_il.cli.progress import make_progress
+    from er_il.provenance import provenance
+    from er_il.study.demos import study_demos
+    from er_il.study.joint_notes import joined
+    from er_il.study.joints import study_joints
+    from er_il.study.joints_figure import plot
+    from er_il.study.prediction import predict, read_training
+    from er_il.study.reports import write_report
+    from er_il.workers import cores
+
+    cells = read_training(training) if training else []
+    console = Console()
+    with make_progress(console) as progress:
+        arm, of_sets = study_demos(demos, episodes, out / "demos", progress, cores())
+        bar = progress.add_task("Measure joints", total=None)
+        study = study_joints(
+            arm, of_sets, cores(), lambda done, total: progress.update(bar, completed=done, total=total)
+        )
+    report = study.report()
+    if training:
+        report["training"] = predict(report, cells)
+    meta = provenance() | {"demos": {name: len(paths) for name, paths in of_sets.items()}}
+    write_report({"meta": meta} | report, out / REPORT)
+    plot(report, out / "joints.png")
+    for note in report["notes"]:
+        console.print(note, highlight=False)
+    for each in report.get("training", []):
+        console.print(
+            f"{each['task']}: rank correlation of the advice with trained success {each['rank_correlation']}; "
+            f"its choice {joined([each['top_choice']])} is {'' if each['top_choice_is_best'] else 'not '}the best.",
+            highlight=False,
+        )
+    console.print(f"{out / REPORT}\n{out / 'joints.png'}", highlight=False, soft_wrap=True)
+
+
+def validity(
+    demos: Positional[tuple[str, ...]] = ("reach_cup",),
+    *,
+    episodes: int = 10,
+    samples: int = 150,
+    out: Path = Path("outputs/study/validity"),
+) -> None:
+    """Which actions are invalid, and why? Delta and absolute actions of growing size in task, ERJ and ERA.
+
+    Args:
+        demos: Folders of datasets of one arm, or tasks to record.
+        episodes: Demonstrations to record of a task, or to look at in a dataset.
+        samples: Actions of each size, in each space, around each kind of states.
+        out: Folder of report.json, validity.png and the recorded demonstrations.
+    """
+    import numpy as np
+    from rich.console import Console
+
+    from er_il.cli.progress import make_progress
+    from er_il.errors import ErIlError
+    from er_il.provenance import provenance
+    from er_il.study.demos import study_demos
+    from er_il.study.reports import write_report
+    from er_il.study.validity import study_validity
+    from er_il.study.validity_figure import plot
+    from er_il.study.validity_report import report as summarised
+    from er_il.workers import cores
+
+    if samples < 1:
+        raise ErIlError(f"{samples} samples are too few: at least one is needed.")
+    console = Console()
+    with make_progress(console) as progress:
+        arm, of_sets = study_demos(demos, episodes, out / "demos", progress, cores())
+        states = np.concatenate([path.measured for paths in of_sets.values() for path in paths])
+        bar = progress.add_task("Draw and decode actions", total=None)
+        outcomes = study_validity(
+            arm, states, samples, cores(), lambda done, total: progress.update(bar, completed=done, total=total)
+        )
+    report = summarised(outcomes)
+    meta = provenance() | {"arm": arm.name, "demos": {name: len(paths) for name, paths in of_sets.items()}}
+    write_report({"meta": meta | {"samples": samples}} | report, out / REPORT)
+    plot(report, out / "validity.png")
+    for finding in report["findings"]:
+        console.print(finding, highlight=False)
+    console.print(f"{out / REPORT}\n{out / 'validity.png'}", highlight=False, soft_wrap=True)
+
+
+Study = (
+    Annotated[Any, subcommand("validity", constructor=validity, prefix_name=False)]
+    | Annotated[Any, subcommand("joints", constructor=joints, prefix_name=False)]
+)
+
+
+def study(which: OmitArgPrefixes[Study]) -> None:
+    """Studies of the action spaces, each with its figure and JSON."""
