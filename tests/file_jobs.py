@@ -51,10 +51,9 @@ class FileJob:
         if self.accident == "die" and self.runs == 1:
             os.kill(os.getpid(), signal.SIGKILL)
         time.sleep(self.sleep)
-        result = [
-            *simulated(self.seed),
-            *(number for need in self.needs for number in json.loads(need.path.read_text())),
-        ]
+        result = simulated(self.seed)
+        for need in self.needs:
+            result += json.loads(need.path.read_text())
         partial = self.path.with_suffix(".partial")
         partial.write_text(json.dumps(result))
         partial.rename(self.path)

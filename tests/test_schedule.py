@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import pytest
 from file_jobs import FileJob, graph
 
 from er_il.schedule import ATTEMPTS, Schedule
@@ -65,6 +66,7 @@ def test_a_failure_is_told_and_stops_only_what_needs_it(tmp_path: Path) -> None:
     assert [job.done for job in jobs] == [False, False, True, True]
 
 
+@pytest.mark.slow
 def test_a_worker_that_dies_is_replaced_and_its_job_run_again(tmp_path: Path) -> None:
     expected, jobs = graph(tmp_path / "expected"), graph(tmp_path / "got", c="die")
     Schedule(expected).run(InOrder())
@@ -86,6 +88,7 @@ class Deadly(FileJob):
         os.kill(os.getpid(), signal.SIGKILL)
 
 
+@pytest.mark.slow
 def test_a_job_that_kills_every_worker_is_given_up(tmp_path: Path) -> None:
     deadly = Deadly(tmp_path / "deadly.json")
     schedule = Schedule([deadly])
@@ -95,6 +98,7 @@ def test_a_job_that_kills_every_worker_is_given_up(tmp_path: Path) -> None:
     assert deadly.runs == ATTEMPTS
 
 
+@pytest.mark.slow
 def test_killed_it_resumes_where_it_was(tmp_path: Path) -> None:
     script = (
         "import sys; from pathlib import Path; from file_jobs import FileJob; from er_il.schedule import Schedule\n"
