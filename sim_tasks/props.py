@@ -149,11 +149,11 @@ class Stand:
 class PushButton:
     """A mushroom push button on a pedestal. Heights [m] above what the pedestal stands on."""
 
-    height: float = 0.30  # of the pedestal's top
+    height: float = 0.29  # of the pedestal's top
     radius: float = 0.05  # of the cap
     dome: float = 0.025  # height of the cap
-    travel: float = 0.04  # down to its stop
-    stiffness: float = 300.0  # [N/m] of the spring under it
+    travel: float = 0.06  # down to its stop
+    stiffness: float = 200.0  # [N/m] of the spring under it
     mass: float = 0.05  # [kg] of the cap
 
     @property
@@ -186,7 +186,16 @@ class PushButton:
         t = np.linspace(0, np.pi / 2, 10)
         vertices, faces = _lathe(np.array([(0, 0), *zip(self.radius * np.cos(t), self.dome * np.sin(t), strict=True)]))
         mesh.uservert, mesh.userface = vertices.ravel(), faces.ravel()
-        cap.add_geom(name=f"{name}_cap", type=MESH, meshname=name, material=material, mass=self.mass)
+        # Smooth plastic (by its priority, whatever touches it): what comes from aside slides up on it and presses.
+        cap.add_geom(
+            name=f"{name}_cap",
+            type=MESH,
+            meshname=name,
+            material=material,
+            mass=self.mass,
+            friction=(0.2, 0.005, 0.0001),
+            priority=1,
+        )
         shaft = (self.rest - self.height) / 2
         cap.add_geom(
             name=f"{name}_shaft",

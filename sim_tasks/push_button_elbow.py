@@ -22,7 +22,7 @@ from sim_tasks.props import PushButton
 BUTTON, PEDESTAL = "button", "pedestal"
 ELBOW = ("panda_link2", "panda_link3", "panda_link4", "panda_link5")  # upper arm to forearm: no other link may press
 PRESSED = 0.02  # [m] of travel from which the button counts as pressed
-DEPTH = 0.03  # [m] to which the leader presses
+DEPTH = 0.05  # [m] to which the leader presses: a policy that stops a little short of that has pressed, too
 HOLD = 0.5  # [s] for which it does
 PITCH = np.radians(57)  # of the hand below the horizontal
 FOLLOW = 0.5  # how far the hand goes along with the button's place, so that the elbow comes down on its middle
@@ -39,7 +39,7 @@ class PushButtonElbow(ArmTask):
     button = PushButton()
     objects = (BUTTON,)
     obstacles = (PEDESTAL,)
-    centre = (0.20, -0.25)
+    centre = (0.18, -0.25)
     hand = (0.50, 0.0, 0.60)  # x, y, z [m] of the hand while the elbow presses a button at the centre
     start = (0.25, -0.8, -0.25, -2.1, -0.2, 2.1, 0.9)  # the elbow up
 

@@ -89,10 +89,11 @@ def test_the_button_stands_in_its_rectangle_or_where_it_is_put(world: PushButton
     assert pose == pytest.approx(expected, abs=1e-6)
 
 
-@pytest.mark.parametrize("x", [0.15, 0.25])
-@pytest.mark.parametrize("y", [-0.255, -0.245])
-def test_the_leader_presses_in_every_corner(world: PushButtonElbow, x: float, y: float) -> None:
-    world.reset(seed=0, options={"state": {BUTTON: (x, y, 0.0)}})
+@pytest.mark.parametrize("dx", [-0.05, 0.05])
+@pytest.mark.parametrize("dy", [-0.005, 0.005])
+def test_the_leader_presses_in_every_corner(world: PushButtonElbow, dx: float, dy: float) -> None:
+    x, y = world.centre
+    world.reset(seed=0, options={"state": {BUTTON: (x + dx, y + dy, 0.0)}})
     assert play(world, world.leader(0)) == "success"
 
 
