@@ -12,6 +12,7 @@ from er_il.urdf import example_robot_data, generated_urdf, parse_urdf
 
 PREFIX = "panda_base_"  # of the new links and joints
 NEW = ("link1", "joint1", "link2", "joint2")
+TORQUE = 3.0  # times the Panda's: the new bend carries about three times the inertia
 
 
 def panda8_urdf() -> Path:
@@ -28,6 +29,9 @@ def _panda8_xml(panda: ET.Element, packages: Path) -> str:
     _connect(new["joint1"], "panda_link0", PREFIX + "link1")
     _connect(new["joint2"], PREFIX + "link1", PREFIX + "link2")
     new["joint1"].set("type", "fixed")
+    limit = new["joint2"].find("limit")
+    assert limit is not None
+    limit.set("effort", str(TORQUE * float(limit.get("effort", 0.0))))
     # What the third joint is to the first two, the old first joint now is to the new ones.
     first = elements["panda_joint1"]
     _connect(first, PREFIX + "link2", "panda_link1")

@@ -66,7 +66,7 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
             image_size: Side [px] of their square images.
             render_mode: ``rgb_array`` for :meth:`render`.
             arm: Preset of the follower and the leader, one of the task's ``arms``.
-            start_range: Each joint starts up to this far [rad] from the start posture.
+            start_range: Each of the last seven joints starts up to this far [rad] from the start posture.
         """
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise UnknownNameError("render mode", render_mode, self.metadata["render_modes"])
@@ -165,9 +165,8 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Start an episode. ``options={"state": {name: (x, y, yaw)}}`` places objects by hand."""
         super().reset(seed=seed)
-        below = self.arm.home[: self.arm.dof - len(self.start)]
-        start = np.append(below, self.start)
-        start += self.np_random.uniform(-self._start_range, self._start_range, self.arm.dof)
+        start = np.array(self.start) + self.np_random.uniform(-self._start_range, self._start_range, len(self.start))
+        start = np.append(self.arm.home[: self.arm.dof - len(start)], start)
         placement = self._draw(self.np_random)
         chosen = (options or {}).get("state", {})
         for name, where in chosen.items():

@@ -36,6 +36,7 @@ class CupTask(ArmTask):
     centre: tuple[float, float]  # x, y [m] of the cup's mean place
     way: tuple[Via, ...]  # of the leader's hand to the grasp
     way_back: tuple[Via, ...]  # with the cup
+    lean: float | None = None  # [rad] of the joints below the base joint, on an arm that has any (or any)
 
     def __init__(
         self,
@@ -115,10 +116,13 @@ class CupTask(ArmTask):
         grasp = np.array([x, y, self.standing + GRASP_HEIGHT])
         turn = rng.uniform(-self._via_range, self._via_range, 3)
         there = [
-            Keyframe(self._hand(grasp + offset + (turn if i == 0 else 0.0)), elbow, straight=i > 0)
+            Keyframe(self._hand(grasp + offset + (turn if i == 0 else 0.0)), elbow, straight=i > 0, lean=self.lean)
             for i, (offset, elbow) in enumerate(self.way)
         ]
-        back = [Keyframe(self._hand(grasp + offset), elbow, straight=True) for offset, elbow in self.way_back]
+        back = [
+            Keyframe(self._hand(grasp + offset), elbow, straight=True, lean=self.lean)
+            for offset, elbow in self.way_back
+        ]
         is_free = self._collisions.is_free
         reach = plan_stretch(self.arm, self.joint_positions, there, is_free)
         leave = plan_stretch(self.arm, reach[-1], back, is_free)

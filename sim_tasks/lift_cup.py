@@ -24,6 +24,7 @@ class LiftCup(CupTask):
         ((0.0, 0.0, 0.0), None),
     )
     way_back = (((-0.03, 0.0, 0.025), None),)  # lifted
+    lean = 0.2
 
     def _build(self, spec: mujoco.MjSpec) -> None:
         self.stand.raised(self.lift).add(spec, "stand", "wood")

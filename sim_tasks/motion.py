@@ -25,6 +25,7 @@ class Keyframe:
     T_base_ee: np.ndarray  # (4, 4)
     elbow: float | None  # [rad] wished angle of the arm's last redundant joint; None: that of the nearest posture
     straight: bool = False  # the hand moves here on a straight line
+    lean: float | None = None  # [rad] as elbow, for the redundant joints below that one, if the arm has any
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,10 @@ def solve_keyframe(arm: Arm, keyframe: Keyframe, seed: Vector, is_free: Callable
 
 def _wishes(arm: Arm, keyframe: Keyframe, seed: Vector) -> dict[str, float]:
     """Angles [rad] of all redundant joints: the keyframe's where it has a wish, else those of the nearest posture."""
-    wishes = {} if keyframe.elbow is None else {arm.redundant[-1]: keyframe.elbow}
+    *below, elbow = arm.redundant
+    wishes = {} if keyframe.lean is None else dict.fromkeys(below, keyframe.lean)
+    if keyframe.elbow is not None:
+        wishes[elbow] = keyframe.elbow
     if left := [joint for joint in arm.redundant if joint not in wishes]:
         nearest = kinematics_of(arm).solve(keyframe.T_base_ee, seed, fixed=wishes).q
         # Free joints differ in the last bits from process to process; a rounded wish leads all to the same plan.

@@ -10,6 +10,7 @@ class ReachRemoveCup(RemoveCup):
     task = "reach_remove_cup"
     task_description = "Reach into the cabinet, grasp the cup by its stem and take it out, upright."
     max_steps = 300
+    arms = ("panda",)
     start = ReachCup.start
     way = ReachCup.way
 

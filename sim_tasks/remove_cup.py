@@ -12,6 +12,7 @@ class RemoveCup(CabinetCup):
     task = "remove_cup"
     task_description = "Grasp the cup by its stem and take it out of the cabinet, upright."
     max_steps = 180
+    lean = 0.1
     start = (0.1, -0.15, -0.11, -2.093, -0.109, 3.166, 0.876)  # inside, before the stem, the elbow up
     way = (
         ((-0.035, 0.0, 0.012), 0.1),  # no lower: the wrist would touch the floor of the compartment

@@ -17,9 +17,9 @@ FINGER_BODIES = ("panda_leftfinger", "panda_rightfinger")
 FINGER_TRAVEL = 0.04  # [m] each finger, from closed to open
 GRIPPER = "gripper"  # actuator name
 
-# Stiffness [Nm/rad] by a joint's torque limit; critically damped, the servo lags by some 20 ms,
-# so that the hand follows within 5 mm at demo speed.
-STIFF, COMPLIANT = 12000.0, 6000.0
+# Stiffness [Nm/rad] of joints whose torque limit [Nm] is above; critically damped, the servo lags by
+# some 20 ms, so that the hand follows within 5 mm at demo speed.
+STIFFNESS = ((200.0, 36000.0), (50.0, 12000.0), (0.0, 6000.0))
 ARMATURE = 0.1  # [kg m^2] reflected rotor inertia
 FINGER_KP, FINGER_KV, FINGER_FORCE = 1000.0, 40.0, 35.0  # [N/m], [Ns/m], [N]
 
@@ -93,7 +93,7 @@ def robot_spec(arm: Arm) -> mujoco.MjSpec:
         urdf_joint.armature = ARMATURE
         torque = float(urdf_joint.actfrcrange[1])
         servo = spec.add_actuator(name=joint, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
-        servo.set_to_position(kp=STIFF if torque > 50 else COMPLIANT, dampratio=1.0)
+        servo.set_to_position(kp=next(kp for above, kp in STIFFNESS if torque > above), dampratio=1.0)
         servo.forcerange = (-torque, torque)
         servo.ctrlrange = urdf_joint.range
     gripper = spec.add_actuator(name=GRIPPER, target=FINGERS[0], trntype=mujoco.mjtTrn.mjTRN_JOINT)
