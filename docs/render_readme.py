@@ -1,4 +1,4 @@
-"""Render the README's tables from the results they come from: ``uv run python docs/render_readme.py``.
+"""Render the pages' tables from the results they come from: ``uv run python docs/render_readme.py``.
 
 A block between ``<!-- results/NAME -->`` and ``<!-- /results/NAME -->`` is the table of
 ``results/NAME/report.json``.
@@ -12,7 +12,7 @@ from er_il.showcase.circle import drift_table
 from er_il.showcase.report import REPORT, success_table
 
 ROOT = Path(__file__).resolve().parents[1]
-README = ROOT / "README.md"
+PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 BLOCK = re.compile(r"(<!-- (results/\w+) -->\n).*?(<!-- /\2 -->)", re.DOTALL)
 
 
@@ -28,4 +28,5 @@ def rendered(text: str) -> str:
 
 
 if __name__ == "__main__":
-    README.write_text(rendered(README.read_text()))
+    for page in PAGES:
+        page.write_text(rendered(page.read_text()))

@@ -21,7 +21,7 @@ PAGES = (
     *sorted(str(page.relative_to(ROOT)) for page in (ROOT / "docs").glob("*.md")),
 )
 
-_BLOCK = re.compile(r"^(?:<!-- (?P<marker>[^>]*) -->\n)?```(?P<language>\w+)\n(?P<text>.*?)^```$", re.M | re.S)
+_BLOCK = re.compile(r"^(?:<!-- (?P<marker>[^>]*) -->\n)? *```(?P<language>\w+)\n(?P<text>.*?)^ *```$", re.M | re.S)
 _RUNNER = ("uv", "run")
 
 
@@ -41,7 +41,9 @@ class Block:
     @property
     def commands(self) -> list[list[str]]:
         """The commands, in the words that a shell would pass on, without ``uv run`` before them."""
-        commands = []
+        commands: list[list[str]] = []
+        if self.language != "bash":
+            return commands
         for line in self.text.replace("\\\n", " ").splitlines():
             words = shlex.split(line, comments=True)
             while words:
@@ -68,18 +70,19 @@ def documented(page: str, start: str) -> list[str]:
     """The first command of a page that starts with these words, without the program's name."""
     words = start.split()
     for block in blocks(page):
-        for command in block.commands if block.language == "bash" else []:
+        for command in block.commands:
             if command[: len(words)] == words:
                 return command[1:]
     raise AssertionError(f"{page} shows no command that starts with {start!r}.")
 
 
 def entry_point(program: str) -> EntryPoint:
-    """The function behind the name of a program.
+    """The function behind the name of one of our programs or LeRobot's.
 
     Raises:
-        AssertionError: no package installs such a program.
+        AssertionError: it is neither, or not installed.
     """
+    assert program == "er-il" or program.startswith("lerobot-"), f"{program} is not run by tests."
     found = list(entry_points(group="console_scripts", name=program))
     assert found, f"No package installs {program}."
     return found[0]

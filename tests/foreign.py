@@ -1,5 +1,7 @@
 """Datasets that er_il did not make, written with plain LeRobot calls."""
 
+import xml.etree.ElementTree as ET
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -55,7 +57,12 @@ def bimanual(lengths=LENGTHS) -> list[dict[str, np.ndarray]]:
 
 def write_bimanual(root: Path, camera: bool = False) -> Path:
     """Write :func:`bimanual` as a dataset: the action is the joints, the state the joints a step before."""
-    vector = {"dtype": "float32", "shape": (len(NAMES),), "names": list(NAMES)}
+    return write_dataset(root, bimanual(), NAMES, camera)
+
+
+def write_dataset(root: Path, episodes: list[dict[str, np.ndarray]], names: Sequence[str], camera: bool) -> Path:
+    """Write named values (T,), by episode: the action is all of them, the state all of them a step before."""
+    vector = {"dtype": "float32", "shape": (len(names),), "names": list(names)}
     features = {"action": vector, "observation.state": dict(vector), "note": {"dtype": "int64", "shape": (1,)}}
     features["note"]["names"] = None
     features["observation.environment_state"] = {"dtype": "float32", "shape": (2,), "names": ["x", "y"]}
@@ -63,8 +70,8 @@ def write_bimanual(root: Path, camera: bool = False) -> Path:
         image = {"dtype": "video", "shape": (32, 32, 3), "names": ["height", "width", "channels"]}
         features["observation.images.top"] = image
     dataset = LeRobotDataset.create("lab/bimanual", 20, features, root=root, robot_type="bi_lab", video_backend="pyav")
-    for values in bimanual():
-        rows = np.stack([values[name] for name in NAMES], axis=1).astype(np.float32)
+    for values in episodes:
+        rows = np.stack([values[name] for name in names], axis=1).astype(np.float32)
         for t, row in enumerate(rows):
             frame = {"action": row, "observation.state": rows[max(0, t - 1)], "note": np.array([t]), "task": "fold"}
             frame["observation.environment_state"] = np.array([t, -t], dtype=np.float32)
@@ -74,3 +81,37 @@ def write_bimanual(root: Path, camera: bool = False) -> Path:
         dataset.save_episode()
     dataset.finalize()
     return root
+
+
+def write_one_arm(root: Path, arm: Arm, names: Sequence[str], degrees: bool = False) -> Path:
+    """Write :func:`paths` of one arm under the names that its joints have there."""
+    episodes = [
+        dict(zip(names, (np.rad2deg(path) if degrees else path).T, strict=True)) | {"gripper.pos": path[:, 0]}
+        for path in paths(arm, 0)
+    ]
+    return write_dataset(root, episodes, [*names, "gripper.pos"], camera=False)
+
+
+def write_openarm(folder: Path) -> None:
+    """Write what two OpenArms' owner has: ``openarm.urdf``, and demonstrations as LeRobot's driver names them.
+
+    The links have the official names; the kinematics are the Panda's, twice.
+    """
+    panda = ET.fromstring(LEFT.model_xml)
+    robot = ET.Element("robot", name="openarm")
+    ET.SubElement(robot, "link", name="openarm_body_link0")
+    values: dict[str, list[np.ndarray]] = {}
+    for side, seed, y in (("left", 0, 0.2), ("right", 1, -0.2)):
+        text = ET.tostring(panda, encoding="unicode").replace("panda_", f"openarm_{side}_")
+        robot.extend(ET.fromstring(text))
+        mount = ET.SubElement(robot, "joint", name=f"openarm_{side}_mount", type="fixed")
+        ET.SubElement(mount, "parent", link="openarm_body_link0")
+        ET.SubElement(mount, "child", link=f"openarm_{side}_link0")
+        ET.SubElement(mount, "origin", xyz=f"0 {y} 0")
+        for path in paths(LEFT, seed):
+            for i, joint in enumerate(np.rad2deg(path).T, start=1):
+                values.setdefault(f"{side}_joint_{i}.pos", []).append(joint)
+            values.setdefault(f"{side}_gripper.pos", []).append(np.linspace(-60, 0, len(path)))
+    (folder / "openarm.urdf").write_text(ET.tostring(robot, encoding="unicode"))
+    episodes = [{name: rows[episode] for name, rows in values.items()} for episode in range(len(LENGTHS))]
+    write_dataset(folder / "demos" / "openarm", episodes, list(values), camera=True)

@@ -1,51 +1,40 @@
 """Policies other than ACT, trained and rolled out with the stock commands."""
 
 import json
-import sys
 from pathlib import Path
 
 import pytest
+from documented import ROOT, documented, run, train_in_process
 from lerobot.policies import PreTrainedPolicy
 from lerobot.policies.diffusion.modeling_diffusion import DiffusionPolicy
-from lerobot.scripts import lerobot_eval, lerobot_train
 from rich.progress import Progress
 
 from er_il.data.recipe import Recipe
 from er_il.data.recording import generate
 from er_il.policy.contract import policy_contract
 from er_il.policy.evaluation import evaluate
-from er_il.policy.training import Training
-from er_il.resources import data_dir
-
-
-def run(main: object, *arguments: str) -> None:
-    """Run a stock command in this process."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "argv", ["command", *arguments])
-        main()  # pyright: ignore[reportCallIssue]
+from er_il.policy.training import pretrained
 
 
 @pytest.mark.slow
-def test_diffusion_trains_on_an_er_dataset_and_rolls_out(tmp_path: Path):
-    generate(Recipe.load("reach_cup").resized(2), ["erj"], tmp_path / "data", Progress(disable=True), workers=2)
-    training = Training(
-        task="reach_cup",
-        space="erj",
-        dataset=tmp_path / "data" / "erj",
-        out=tmp_path / "policy",
-        config=data_dir("configs") / "diffusion.yaml",
-        steps=2,
-        seed=0,
-    )
-    run(lerobot_train.main, *training.command[1:], "--batch_size=4", "--policy.num_inference_steps=2")
-    loaded: PreTrainedPolicy = DiffusionPolicy.from_pretrained(training.policy)
+def test_diffusion_trains_on_an_er_dataset_and_rolls_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    Path("configs").symlink_to(ROOT / "configs")
+    data = Path("datasets/reach_cup")
+    generate(Recipe.load("reach_cup").resized(2), ["erj"], data, Progress(disable=True), workers=2)
+    train_in_process(monkeypatch, "--batch_size=4", "--policy.num_inference_steps=2")
+    run("er-il", *documented("docs/policies.md", "er-il train"), "--steps", "2")
+    policy = pretrained(Path("policies/reach_cup/erj_diffusion"))
+    loaded: PreTrainedPolicy = DiffusionPolicy.from_pretrained(policy)
     assert loaded.config.output_features["action"].shape == (9,)
-    assert policy_contract(training.policy).space == "erj"
+    assert policy_contract(policy).space == "erj"
     rollout = ["--env.type=er_il", "--env.task=reach_cup", "--env.action_space=erj", "--eval.recording=true"]
     rollout += ["--eval.n_episodes=1", "--eval.batch_size=1", f"--output_dir={tmp_path / 'eval'}"]
-    run(lerobot_eval.main, f"--policy.path={training.policy}", *rollout)
+    run("lerobot-eval", f"--policy.path={policy}", *rollout)
     overall = json.loads((tmp_path / "eval" / "eval_info.json").read_text())["overall"]
     assert overall["n_episodes"] == 1
+    run("er-il", *documented("docs/policies.md", "er-il eval"), "--episodes", "1", "--out", "first")
+    (first,) = json.loads(Path("first/report.json").read_text())["cells"]
     # The noise is drawn anew in every rollout, from the rollout's seed.
-    first, second = (evaluate(training.policy, "reach_cup", "erj", episodes=1).episodes[0] for _ in range(2))
-    assert (first.steps, first.joint_step) == (second.steps, second.joint_step)
+    second = evaluate(policy, "reach_cup", "erj", episodes=1).episodes[0]
+    assert (first["mean_steps"], first["max_joint_step"]) == (second.steps, second.joint_step)

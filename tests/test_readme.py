@@ -1,13 +1,29 @@
-"""The README's tables are those of the results it names."""
+"""The pages' tables are those of the results they name, and of the tasks there are."""
 
 import runpy
 from pathlib import Path
 
+from sim_tasks import TASKS
+from sim_tasks.arm_task import RATE
+
 ROOT = Path(__file__).resolve().parents[1]
 
 
-def test_the_readmes_tables_are_rendered_from_the_results() -> None:
+def test_the_pages_tables_are_rendered_from_the_results() -> None:
     renderer = runpy.run_path(str(ROOT / "docs" / "render_readme.py"))
-    text = (ROOT / "README.md").read_text()
-    assert len(renderer["BLOCK"].findall(text)) >= 2
-    assert renderer["rendered"](text) == text, "run docs/render_readme.py"
+    found = []
+    for page in renderer["PAGES"]:
+        text = page.read_text()
+        found += [name for _, name, _ in renderer["BLOCK"].findall(text)]
+        assert renderer["rendered"](text) == text, "run docs/render_readme.py"
+    assert {"results/demo", "results/circle", "results/replay", "results/lift_cup"} <= set(found)
+
+
+def test_every_task_is_in_the_tables_with_its_time() -> None:
+    readme, page = (ROOT / "README.md").read_text(), (ROOT / "docs" / "tasks.md").read_text()
+    for task in TASKS:
+        row = next(line for line in readme.splitlines() if line.startswith(f"| `{task.task}`"))
+        assert row.endswith(f"| {task.max_steps / RATE:g} s |")
+        assert f"`{task.task}`" in page
+        assert f"images/tasks/{task.task}.webp" in page
+        assert (ROOT / "docs" / "images" / "tasks" / f"{task.task}.webp").stat().st_size < 200_000

@@ -198,8 +198,8 @@ def test_what_lerobot_edits_still_decodes_and_trains(places, tmp_path, monkeypat
         "--operation.episode_indices",
         "[1]",
     )
-    roots = [path for path in (tmp_path / "split").iterdir() if path.is_dir()]
-    merge = f"[{', '.join(repr(str(path)) for path in (*sorted(roots), tmp_path / 'less'))}]"
+    roots = sorted(path for path in (tmp_path / "split").iterdir() if path.is_dir())
+    merge = f"[{', '.join(repr(str(path)) for path in (*roots, tmp_path / 'less'))}]"
     edit(
         "--new_repo_id",
         "lab/merged",
@@ -216,33 +216,25 @@ def test_what_lerobot_edits_still_decodes_and_trains(places, tmp_path, monkeypat
     )
     assert len(list(tmp_path.glob("merged/data/*/*.parquet"))) == 3
     _run(monkeypatch, "encode", tmp_path / "merged", "--to", "era", "--out", tmp_path / "again")
-    for dataset, episodes in ((tmp_path / "less", 2), (tmp_path / "merged", 5), (tmp_path / "again", 5)):
+    spec = dataset_info(places / "erj").features[ACTION]["info"]
+    for dataset in (*roots, tmp_path / "less", tmp_path / "merged"):
+        assert dataset_info(dataset).features[ACTION]["info"] == spec
+    sizes = {roots[0]: 1, roots[1]: 2, tmp_path / "less": 2, tmp_path / "merged": 5, tmp_path / "again": 5}
+    for dataset, episodes in sizes.items():
         report = _verified(monkeypatch, dataset, tmp_path / "report" / dataset.name)
         assert report["episodes"] == episodes
         assert max(arm["joint_error_unflagged"]["p100"] for arm in report["arms"].values()) <= 1e-3
-    _stock(
-        monkeypatch,
-        lerobot_train,
-        "--dataset.repo_id=lab/merged",
-        f"--dataset.root={tmp_path / 'merged'}",
-        "--dataset.video_backend=pyav",
-        "--policy.type=act",
-        "--policy.device=cpu",
-        "--policy.push_to_hub=false",
-        "--policy.pretrained_backbone_weights=null",
-        "--policy.dim_model=32",
-        "--policy.n_heads=2",
-        "--policy.dim_feedforward=32",
-        "--policy.chunk_size=5",
-        "--policy.n_action_steps=5",
-        "--steps=2",
-        "--batch_size=2",
-        "--num_workers=0",
-        f"--output_dir={tmp_path / 'policy'}",
-    )
-    config = json.loads((tmp_path / "policy/checkpoints/last/pretrained_model/config.json").read_text())
-    assert config["output_features"]["action"]["shape"] == [19]
-    assert SOURCE_ACTION not in config["input_features"] | config["output_features"]
+    tiny = ("--policy.type=act", "--policy.device=cpu", "--policy.push_to_hub=false", "--num_workers=0")
+    tiny += ("--policy.pretrained_backbone_weights=null", "--dataset.video_backend=pyav", "--steps=2", "--batch_size=2")
+    tiny += ("--policy.dim_model=32", "--policy.n_heads=2", "--policy.dim_feedforward=32", "--policy.chunk_size=5")
+    tiny += ("--policy.n_action_steps=5",)
+    for dataset in (roots[1], tmp_path / "less", tmp_path / "merged"):  # split, deleted from, merged
+        out = tmp_path / "policy" / dataset.name
+        where = (f"--dataset.repo_id=lab/{dataset.name}", f"--dataset.root={dataset}", f"--output_dir={out}")
+        _stock(monkeypatch, lerobot_train, *where, *tiny)
+        config = json.loads((out / "checkpoints/last/pretrained_model/config.json").read_text())
+        assert config["output_features"]["action"]["shape"] == [19]
+        assert SOURCE_ACTION not in config["input_features"] | config["output_features"]
 
 
 def _one_arm(places, tmp_path, monkeypatch, *options):

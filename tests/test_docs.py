@@ -1,0 +1,170 @@
+"""Every command that the pages show is run: as it stands, or with smaller numbers behind it."""
+
+import contextlib
+import functools
+import io
+import logging
+import re
+import shlex
+import shutil
+import textwrap
+from collections.abc import Callable, Generator
+from pathlib import Path
+
+import draccus
+import pytest
+from documented import PAGES, ROOT, Block, blocks, entry_point, run, train_in_process
+from foreign import write_bimanual, write_one_arm, write_openarm
+
+import er_il.cli
+from er_il import Arm
+
+# What is put behind a command, where it would take long or download something; the last of equal options counts.
+SMALLER = {
+    "er-il generate": "--episodes 3",
+    "er-il train": "--steps 2",
+    "er-il eval": "--episodes 2",
+    "lerobot-train": "--steps=2 --batch_size=2 --num_workers=0 --policy.device=cpu --dataset.video_backend=pyav "
+    "--policy.pretrained_backbone_weights=null --policy.dim_model=32 --policy.dim_feedforward=32 --policy.n_heads=2",
+    "lerobot-eval": "--eval.n_episodes=1 --eval.batch_size=1 --eval.recording=true",
+    "lerobot-record": "--dataset.num_episodes=2 --dataset.episode_time_s=1 --robot.image_size=32",
+    "lerobot-rollout": "--duration=0.5 --robot.image_size=32",
+    "lerobot-dataset-viz": "--save=1 --output-dir=.",
+}
+CI = ".ci/run"
+TEST = "test"  # marks the README's block that .ci/run runs
+NEEDS = ("needs: hardware", "needs: a network", "needs: a display")  # read their arguments, and no more
+SHOWN_ONLY = {"yaml", "text"}  # languages of blocks that hold no commands
+
+
+def prepare_real_arm(folder: Path) -> None:
+    panda, xarm = Arm.preset("panda"), Arm.preset("xarm7")
+    write_one_arm(folder / "demos/franka", panda, [f"{joint}.pos" for joint in panda.joints])
+    write_one_arm(folder / "demos/xarm", xarm, [f"joint{i}.pos" for i in range(1, 8)], degrees=True)
+    write_openarm(folder)
+
+
+# What a reader of the page has already.
+PREPARED: dict[str, Callable[[Path], object]] = {
+    "docs/real_arm.md": prepare_real_arm,
+    "docs/reencode.md": lambda folder: write_bimanual(folder / "my_robot"),
+}
+
+
+@pytest.fixture(autouse=True)
+def quiet_logging() -> Generator[None]:
+    """Undo what the stock commands do to the root logger, which pytest listens on."""
+    root = logging.getLogger()
+    handlers, level = list(root.handlers), root.level
+    yield
+    root.handlers[:] = handlers
+    root.setLevel(level)
+
+
+@pytest.fixture
+def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder with the configurations, as after a clone, to work in."""
+    shutil.copytree(ROOT / "configs", tmp_path / "configs")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def run_here(page: str) -> list[Block]:
+    """The blocks that nothing else runs; none if the README shows all that they say, in the same words."""
+    here = [
+        block
+        for block in blocks(page)
+        if block.language in {"bash", "python"} and (not block.marker or block.marker in NEEDS)
+    ]
+    shown = [command for block in blocks("README.md") for command in block.commands]
+    repeated = all(block.language == "bash" and all(each in shown for each in block.commands) for block in here)
+    return [] if repeated and page != "README.md" else here
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", [page for page in PAGES if run_here(page)])
+def test_the_commands_run(page: str, workspace: Path, monkeypatch: pytest.MonkeyPatch):
+    PREPARED.get(page, lambda folder: None)(workspace)
+    train_in_process(monkeypatch, "--batch_size=2")
+    names: dict[str, object] = {}
+    for block in blocks(page):
+        if block.language == "yaml":  # its first line says which file it is
+            Path(block.text.split("\n")[0].removeprefix("# ")).write_text(block.text)
+    for block in run_here(page):
+        if block.marker:
+            for command in block.commands:
+                parse(command, monkeypatch)
+        elif block.language == "python":
+            exec(textwrap.dedent(block.text), names)
+        else:
+            for command in block.commands:
+                smaller = next((SMALLER[start] for start in SMALLER if shlex.join(command).startswith(start)), "")
+                run(*command, *shlex.split(smaller))
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_command_is_run_or_the_page_says_why_not(page: str, monkeypatch: pytest.MonkeyPatch):
+    for block in blocks(page):
+        assert block.language in {"bash", "python", *SHOWN_ONLY}, block.text
+        if block.marker == TEST:
+            assert page == "README.md"  # where .ci/run looks for it
+        elif block.marker and block.marker not in NEEDS:
+            assert block.marker.startswith("run by: "), block.marker
+            for command in block.commands:
+                assert is_run_by(block.marker.removeprefix("run by: "), command, page), shlex.join(command)
+    assert not re.findall(r"^ {4}(?:er-il|lerobot-|uv|pip) .*$", prose(page), re.MULTILINE)
+    for span in re.findall(r"`((?:er-il|lerobot-)[^`]*)`", prose(page)):
+        name, *words = span.split()
+        options = {word.split("=")[0] for word in words if word.startswith("--")}
+        if name == "er-il" and words and words[0] != "COMMAND":
+            assert options <= options_of(words[0]) | {"--help"}, span
+        else:
+            assert entry_point(name), span
+            assert name == "er-il" or not options, f"{span}: show it in a block, where it is run"
+
+
+def prose(page: str) -> str:
+    """A page without its fenced blocks."""
+    return re.sub(r"^```.*?^```$", "", (ROOT / page).read_text(), flags=re.MULTILINE | re.DOTALL)
+
+
+def is_run_by(file: str, command: list[str], page: str) -> bool:
+    source = (ROOT / file).read_text()
+    by_ci = [each for block in blocks("README.md") if block.marker == TEST for each in block.commands]
+    if command in by_ci or (file == CI and shlex.join(command) in source):
+        return True
+    taken = re.findall(r'documented\("([^"]+)", "([^"]+)"', source)
+    return any(where == page and shlex.join(command).startswith(start) for where, start in taken)
+
+
+def options_of(command: str) -> set[str]:
+    """The options of one of er-il's commands, by its help."""
+    shown = io.StringIO()
+    with contextlib.redirect_stdout(shown):
+        run("er-il", command, "--help")
+    return set(re.findall(r"--[a-z-]+", shown.getvalue()))
+
+
+class ParsedError(Exception):
+    """The arguments were understood."""
+
+
+def parse(command: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let a command read its arguments, and no more."""
+
+    def stop(function: Callable[..., object]) -> Callable[..., object]:
+        @functools.wraps(function)
+        def stopped(*args: object, **kwargs: object) -> None:
+            raise ParsedError
+
+        return stopped
+
+    def parsed(*args: object, **kwargs: object) -> None:
+        draccus_parse(*args, **kwargs)  # pyright: ignore[reportArgumentType]
+        raise ParsedError
+
+    draccus_parse, find = draccus.parse, er_il.cli._command
+    with monkeypatch.context() as patch, pytest.raises(ParsedError):
+        patch.setattr(er_il.cli, "_command", lambda name, module: stop(find(name, module)))
+        patch.setattr(draccus, "parse", parsed)
+        run(*command)
