@@ -28,6 +28,7 @@ def benchmark(
     from er_il.benchmark.account import Account
     from er_il.benchmark.cluster import RayExecutor
     from er_il.benchmark.grid import Grid
+    from er_il.benchmark.page import PAGE, write_pages
     from er_il.benchmark.plan import Plan
     from er_il.benchmark.report import write_results
     from er_il.benchmark.view import View
@@ -43,8 +44,11 @@ def benchmark(
         view = View(Account(plan, schedule), schedule, executor, console)
         with Live(view, console=console, refresh_per_second=2):
             schedule.run(executor, view.update)
-    report = write_results(plan, results or Path("results") / grid.stem)
+    folder = results or Path("results") / grid.stem
+    report = write_results(plan, folder)
+    write_pages(folder)
     console.print(results_table(report["cells"]))
+    console.print(f"{folder / PAGE}", highlight=False, soft_wrap=True)
     for message in schedule.failed.values():
         console.print(f"Failed: {message}", style="red", highlight=False)
     if schedule.failed:

@@ -16,9 +16,19 @@ LABELS = {
     "era": "ERA",
     "task-nearest": "Task\n(nearest)",
     "task-posture": "Task\n(posture)",
+    "task-mean": "Task\n(mean posture)",
+    "task-grasp": "Task\n(grasp posture)",
 }
 # Okabe and Ito's palette: told apart by every eye.
-COLOURS = {"joint": "#56B4E9", "erj": "#009E73", "era": "#CC79A7", "task-nearest": "#E69F00", "task-posture": "#D55E00"}
+COLOURS = {
+    "joint": "#56B4E9",
+    "erj": "#009E73",
+    "era": "#CC79A7",
+    "task-nearest": "#E69F00",
+    "task-posture": "#D55E00",
+    "task-mean": "#F0E442",
+    "task-grasp": "#999999",
+}
 
 
 def success_table(cells: Sequence[Mapping[str, Any]]) -> str:
