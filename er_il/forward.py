@@ -12,6 +12,7 @@ from er_il.arm import Arm, Vector
 from er_il.errors import ShapeError, UnknownNameError
 
 Array = NDArray[np.float64]
+ASIDE = 1e-3  # [m] joints nearer than this are at the same place
 AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
@@ -84,8 +85,9 @@ class ForwardKinematics:
     def twisting(self) -> NDArray[np.bool_]:
         """Which joints (n,) twist the links that they join; the others bend the arm.
 
-        A joint twists if what joins it to the joint before and the one after (the base and the end
-        effector at the ends) goes along its axis rather than across.
+        A joint twists if the way from the joint before and to the one after (the base and the end
+        effector at the ends) goes along its axis rather than across, all joints at zero. Joints at
+        the same place, as in a shoulder, are passed over.
         """
         names = [self._model.names[joint] for joint in self._chain]
         order = sorted(range(len(self.arm.joints)), key=lambda i: names.index(self.arm.joints[i]))
@@ -95,10 +97,13 @@ class ForwardKinematics:
         T_base_world = self._data.oMf[self._base].inverse()
         ends = [np.zeros(3), T_base_world.act(self._data.oMf[self._ee].translation)]
         origins = [T_base_world.act(self._data.oMi[joint].translation) for joint in self._chain]
-        points = np.array([ends[0], *origins, ends[1]])
+        points = [ends[0], *origins, ends[1]]
         twisting = np.empty(self.arm.dof, dtype=bool)
         for at, i in enumerate(order):
-            links = np.diff(points[at : at + 3], axis=0)
+            ways = [point - points[at + 1] for point in points]
+            before = next((way for way in ways[at::-1] if np.linalg.norm(way) > ASIDE), ways[at])
+            after = next((way for way in ways[at + 2 :] if np.linalg.norm(way) > ASIDE), ways[at + 2])
+            links = np.array([before, after])
             along = np.abs(links @ axes[i])
             twisting[i] = along.sum() >= np.sqrt(np.maximum((links**2).sum(axis=1) - along**2, 0.0)).sum()
         return twisting

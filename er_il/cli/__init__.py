@@ -12,6 +12,7 @@ from er_il.errors import ErIlError
 # Command -> module under er_il.cli that holds a function of the command's name. Their heavy
 # imports (torch, MuJoCo, Rerun) wait inside the functions, so that help is instant.
 COMMANDS: dict[str, str] = {
+    "advise": "advise",
     "attach": "attach",
     "benchmark": "benchmark",
     "circle": "circle",

@@ -93,8 +93,8 @@ def _singularities(report: Report) -> list[str]:
 def _next(report: Report) -> list[str]:
     if report["recommended"] == report["default"]:
         return ["It is what erj commands on this arm by default."]
-    name = f"erj@{'+'.join(report['recommended'])}"
-    return [f"By default erj commands {joined(report['default'])} on this arm: ask for {name}."]
+    default, name = joined(report["default"]), f"erj@{'+'.join(report['recommended'])}"
+    return [f"By default erj commands {default} on this arm ({risks(report)[default]:.1%}): ask for {name}."]
 
 
 def _fitness(of_set: Sequence[Mapping[str, Any]], choice: Sequence[str]) -> Mapping[str, Any]:

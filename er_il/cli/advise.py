@@ -1,0 +1,131 @@
+"""``er-il advise``: which joints ERJ should command, for an arm and its demonstrations."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tyro.conf import OmitArgPrefixes, Positional
+
+from er_il.cli.arm_options import ArmOptions
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, TaskID
+    from rich.table import Table
+
+    from er_il.arm import Arm
+    from er_il.study.joints import Demos
+
+ROWS = 10  # of the table; --json has all
+
+
+def advise(
+    source: Positional[str],
+    *,
+    robot: OmitArgPrefixes[ArmOptions],
+    episodes: int = 10,
+    json: Path | None = None,
+    plot: Path | None = None,
+) -> None:
+    """Recommend the joints that ERJ should command, n-6 of them, and say why.
+
+    Measures every choice over the workspace and along the demonstrations, if a dataset is given.
+
+    Args:
+        source: Folder or repository id of a dataset, a preset, or a URDF (with --ee-frame).
+        robot: The arm of a dataset that does not know it, or the frames and joints of a URDF.
+        episodes: Episodes of the dataset to look at, spread evenly.
+        json: File (.json) for all figures; with several arms, one each.
+        plot: File (.png) for the picture; with several arms, one each.
+    """
+    import functools
+
+    from rich.console import Console
+
+    from er_il.cli.progress import make_progress
+    from er_il.joint_choice import choices
+    from er_il.provenance import provenance
+    from er_il.study.joints import study_joints
+    from er_il.study.joints_figure import plot as draw
+    from er_il.study.reports import write_report
+    from er_il.workers import cores
+
+    console = Console()
+    found = _arms(source, robot, episodes)
+    for arm, _ in found.values():
+        choices(arm)  # an arm without redundancy is told before another one is measured
+    for label, (arm, demos) in found.items():
+        with make_progress(console) as progress:
+            show = functools.partial(_show, progress, progress.add_task(f"Measure {label or arm.name}", total=None))
+            report = study_joints(arm, demos, cores(), show).report()
+        console.print(_table(report))
+        for note in report["notes"]:
+            console.print(note, highlight=False)
+        if json:
+            write_report({"meta": provenance() | {"source": source}} | report, _named(json, label))
+        if plot:
+            draw(report, _named(plot, label))
+
+
+def _arms(source: str, robot: ArmOptions, episodes: int) -> "dict[str, tuple[Arm, Demos]]":
+    """Each arm by its label, and its demonstrations."""
+    from dataclasses import replace
+
+    from er_il.arm import PRESETS
+    from er_il.errors import DatasetError
+
+    if source in PRESETS or (Path(source).is_file() and Path(source).suffix in (".urdf", ".xml")):
+        if robot.arm or robot.arms:
+            raise DatasetError(f"{source} is an arm: --arm and --arms are for datasets that do not know theirs.")
+        return {"": (replace(robot.wiring(), arm=source).build_arm(), {})}
+    wirings = robot.wirings()
+    if Path(source).suffix in (".urdf", ".xml"):
+        raise DatasetError(f"There is no file {source}. Presets are {', '.join(sorted(PRESETS))}.")
+
+    from er_il.data.hub import find_dataset
+    from er_il.data.joint_paths import read_joint_paths
+    from er_il.study.demos import spread
+    from er_il.workers import cores
+
+    read = read_joint_paths(find_dataset(source), wirings, cores())
+    name = Path(source).resolve().name if Path(source).exists() else source
+    return {each.label: (each.arm, {name: spread(each.paths, episodes)}) for each in read}
+
+
+def _table(report: Mapping[str, Any]) -> "Table":
+    """The best choices over the workspace and along the demonstrations, one a row."""
+    from rich.table import Table
+
+    from er_il.study.joint_notes import joined, risks
+
+    table = Table(box=None, header_style="bold")
+    table.add_column("Commanded", no_wrap=True)
+    headings = ["Risk", "Self-motion", "Near singular", "Round trips missed"]
+    demos = list(report["demos"].values())
+    headings += ["…along demos", "Folds crossed", "Flips played back"] * bool(demos)
+    for heading in headings:
+        table.add_column(heading, justify="right")
+    workspace = {joined(each["joints"]): each for each in report["workspace"]}
+    along = {joined(each["joints"]): each for of_set in demos for each in of_set}
+    for choice in report["ranking"][:ROWS]:
+        name = joined(choice)
+        each = workspace[name]
+        row = [
+            f"{risks(report)[name]:.1%}",
+            f"{each['self_motion']:.2f}",
+            f"{each['near_singular']:.0%}",
+            f"{each['missed']:.1%}",
+        ]
+        if demos:
+            row += [f"{along[name]['missed']:.1%}", f"{along[name]['folds']:.1f}", f"{along[name]['flips']:.1f}"]
+        table.add_row(name, *row, style="bold" if choice == report["recommended"] else None)
+    if len(workspace) > ROWS:
+        table.caption = f"and {len(workspace) - ROWS} more, with --json"
+    return table
+
+
+def _show(progress: "Progress", bar: "TaskID", done: int, total: int) -> None:
+    progress.update(bar, completed=done, total=total)
+
+
+def _named(path: Path, label: str) -> Path:
+    return path.with_stem(f"{path.stem}_{label}") if label else path

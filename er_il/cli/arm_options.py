@@ -1,0 +1,75 @@
+"""What a user says about the arm of a dataset that does not know it, alike in every command that asks."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import arg
+
+if TYPE_CHECKING:
+    from er_il.data.wiring import Wiring
+
+Names = Annotated[tuple[str, ...], arg(metavar="NAME ...")]
+Numbers = Annotated[tuple[float, ...], arg(metavar="X ...")]
+
+
+@dataclass(frozen=True)
+class ArmOptions:
+    """Which arm it is, and which dimensions are its joints."""
+
+    arm: str = ""
+    """Preset (panda, panda8, xarm7), or path of a URDF."""
+    ee_frame: str = ""
+    """Link whose pose the actions command; a URDF needs it."""
+    base_frame: str = ""
+    """Link in which poses are expressed; the URDF's root if omitted."""
+    joints: Names = ()
+    """Dimensions of the action that are the arm's joints, base first; found by the arm's joint names if omitted.
+    All other dimensions, such as the gripper, are passed through."""
+    state_joints: Names = ()
+    """The same of observation.state; those of the same names if omitted."""
+    units: str = "rad"
+    """Units of the joints in the dataset: rad or deg."""
+    signs: Numbers = ()
+    """1 or -1 for each joint: the URDF's angle is sign * value + offset."""
+    offsets: Numbers = ()
+    """Offset of each joint, in the dataset's units."""
+    urdf_joints: Names = ()
+    """Joints of the URDF, base first; all between base and end effector if omitted."""
+    arms: Path | None = None
+    """YAML file with one entry an arm, for several arms, in place of the options above."""
+
+    def wiring(self) -> "Wiring":
+        """The one arm that the options describe."""
+        from er_il.data.wiring import Wiring
+
+        return Wiring(
+            self.arm,
+            ee_frame=self.ee_frame,
+            base_frame=self.base_frame,
+            urdf_joints=self.urdf_joints,
+            joints=self.joints,
+            state_joints=self.state_joints,
+            units=self.units,
+            signs=self.signs,
+            offsets=self.offsets,
+        )
+
+    def wirings(self, redundant: tuple[str, ...] = (), angle_frames: tuple[str, ...] = ()) -> "list[Wiring]":
+        """All arms; none if nothing is said. Wrong options are told here, before seconds of imports.
+
+        Raises:
+            ErIlError: both an arm and a file of arms are given, or they are wrong.
+        """
+        from er_il.data.wiring import read_wirings
+        from er_il.errors import DatasetError
+
+        if self.arms is not None and self.arm:
+            raise DatasetError("Give either --arm or --arms.")
+        if self.arms is not None:
+            return read_wirings(self.arms)
+        if not self.arm:
+            return []
+        wiring = replace(self.wiring(), redundant=redundant, angle_frames=angle_frames)
+        wiring.build_arm()
+        return [wiring]
