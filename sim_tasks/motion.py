@@ -100,7 +100,8 @@ def plan_stretch(
     for keyframe in keyframes:
         goal = solve_keyframe(arm, keyframe, waypoints[-1], is_free)
         waypoints += _straight(arm, waypoints[-1], goal, keyframe) if keyframe.straight else [goal]
-    path = np.array(waypoints)
+    # Solutions of IK differ in the last bits from process to process, and servos at their limits would amplify that.
+    path = np.array(waypoints).round(12)
     for one, other in pairwise(path):
         for t in np.linspace(0, 1, max(2, int(np.max(np.abs(other - one)) / CHECK_STEP) + 1)):
             if not is_free((1 - t) * one + t * other):
