@@ -15,7 +15,8 @@ from er_il.data.demos import Demo, make_world, record_demo
 from er_il.data.recipe import Recipe
 from er_il.data.record import Record
 from er_il.data.recording import generate
-from er_il.data.schema import ACTION, DEMO_SEED, LEADER_JOINTS, action_spec
+from er_il.data.schema import ACTION, DEMO_SEED, ENVIRONMENT_STATE, LEADER_JOINTS, action_spec
+from er_il.data.stillness import LEAST_RANGE
 from er_il.errors import DatasetError, UnknownNameError
 from er_il.spaces import from_spec
 
@@ -64,6 +65,18 @@ def test_the_actions_are_the_encoded_leader(generated):
         decoded = space.decode(actions[row], seed=leader[row, :-1] + 0.01)
         np.testing.assert_allclose(decoded.q, leader[row, :-1], atol=1e-3)
         assert decoded.gripper == pytest.approx(leader[row, -1], abs=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["joint", "erj"])
+def test_what_stands_still_is_not_scaled_up(generated, kind):
+    dataset = _load(generated.paths[kind])
+    poses = np.stack(dataset.hf_dataset[ENVIRONMENT_STATE])
+    low, high = (np.array(dataset.meta.stats[ENVIRONMENT_STATE][key]) for key in ("min", "max"))
+    moved = np.ptp(poses, axis=0) >= LEAST_RANGE
+    assert 0 < np.sum(moved) < poses.shape[1]  # lifted, hardly turned
+    np.testing.assert_allclose((low[moved], high[moved]), (poses.min(axis=0)[moved], poses.max(axis=0)[moved]))
+    np.testing.assert_allclose((high - low)[~moved], LEAST_RANGE, rtol=1e-5)
+    assert np.all((low <= poses) & (poses <= high))
 
 
 def test_a_demo_seed_brings_its_world_back(generated):
