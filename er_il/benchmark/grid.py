@@ -8,6 +8,7 @@ from typing import Any
 
 import yaml
 
+from er_il.arm import Arm
 from er_il.data.recipe import Recipe
 from er_il.errors import ErIlError, UnknownNameError
 from er_il.policy.jobs import space_of
@@ -36,7 +37,7 @@ class Grid:
 
     Raises:
         GridError: a value that no grid can have.
-        UnknownNameError: unknown task, decoder or sceptic's decoder.
+        UnknownNameError: unknown task, arm, decoder or sceptic's decoder.
     """
 
     title: str
@@ -49,10 +50,12 @@ class Grid:
     episodes: int | None = None  # to record a task, those held out included; as many as its recipe says if None
     steps: int | None = None  # of training; as many as the space's configuration says if None
     introduction: str = ""  # a paragraph for the page
+    arm: str = "panda"
 
     def __post_init__(self) -> None:
         for task in self.tasks:
             task_id(task)  # raises if unknown
+        Arm.preset(self.arm)  # raises if unknown
         for name in self.sceptics:
             if name not in SCEPTICS:
                 raise UnknownNameError("sceptic's decoder", name, SCEPTICS)
@@ -85,7 +88,7 @@ class Grid:
 
     def recipe(self, task: str) -> Recipe:
         """What is recorded of a task."""
-        recipe = Recipe.load(task)
+        recipe = Recipe.load(task, self.arm)
         return recipe if self.episodes is None else recipe.resized(self.episodes)
 
     @property
@@ -140,7 +143,7 @@ class Grid:
         return {key: list(value) if isinstance(value, tuple) else value for key, value in values.items()}
 
 
-_TEXTS, _NAMES = ("title", "introduction"), ("tasks", "decoders", "sceptics")
+_TEXTS, _NAMES = ("title", "introduction", "arm"), ("tasks", "decoders", "sceptics")
 _NUMBERS, _OPTIONAL = ("training_seeds", "demonstrations"), ("episodes", "steps")
 
 

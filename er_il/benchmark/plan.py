@@ -30,6 +30,7 @@ class Demonstrate:
     """Record the demonstrations of a task's recipe, once, and encode them in each space."""
 
     task: str
+    arm: str
     episodes: int
     spaces: tuple[str, ...]
     out: Path  # folder of the datasets, one a space
@@ -54,7 +55,8 @@ class Demonstrate:
     def run(self) -> None:
         """Record and encode what is missing."""
         with Progress(disable=True) as progress:
-            generate(Recipe.load(self.task).resized(self.episodes), self.spaces, self.out, progress, workers=1)
+            recipe = Recipe.load(self.task, self.arm).resized(self.episodes)
+            generate(recipe, self.spaces, self.out, progress, workers=1)
 
 
 @dataclass(frozen=True)
@@ -103,7 +105,8 @@ class Plan:
         spaces = tuple(dict.fromkeys(space_of(entry.decoder) for entry in self.grid.entries))
         folder = self.out / "datasets"
         return {
-            task: Demonstrate(task, self.grid.recipe(task).episodes, spaces, folder / task) for task in self.grid.tasks
+            task: Demonstrate(task, self.grid.arm, self.grid.recipe(task).episodes, spaces, folder / task)
+            for task in self.grid.tasks
         }
 
     def training(self, entry: Entry, seed: int) -> Train:

@@ -14,6 +14,7 @@ def generate(
     spaces: str = "joint,task,erj",
     episodes: int | None = None,
     seed: int | None = None,
+    arm: str | None = None,
     cameras: Annotated[str | None, arg(metavar="NAME,NAME")] = None,
     size: int | None = None,
     out: Path | None = None,
@@ -28,9 +29,11 @@ def generate(
             They name the datasets' folders.
         episodes: Number of demonstrations.
         seed: Seed of the demonstrations.
+        arm: Arm that does the task: panda, or panda8 with eight joints.
         cameras: Cameras to record, separated by commas, such as wrist,shoulder.
         size: Width and height of the cameras' images [px].
-        out: Folder of the datasets; datasets/<task> if omitted.
+        out: Folder of the datasets; datasets/<task> if omitted, and datasets/<task>_<arm> for another arm than the
+            recipe's.
     """
     from rich.console import Console
 
@@ -38,15 +41,16 @@ def generate(
     from er_il.data.recipe import Recipe
     from er_il.workers import cores
 
-    recipe = Recipe.load(task)
+    recipe = usual = Recipe.load(task)
     if episodes is not None:
         recipe = recipe.resized(episodes)
-    given = {"seed": seed, "cameras": _split(cameras), "image_size": size}
+    given = {"seed": seed, "arm": arm, "cameras": _split(cameras), "image_size": size}
     recipe = replace(recipe, **{key: value for key, value in given.items() if value is not None})
     from er_il.data.demos import tally
     from er_il.data.recording import generate as generate_datasets  # seconds of imports: wrong options are told before
 
-    folder = out if out is not None else Path("datasets") / task
+    name = task if recipe.arm == usual.arm else f"{task}_{recipe.arm}"
+    folder = out if out is not None else Path("datasets") / name
     console = Console()
     with make_progress(console) as progress:
         generated = generate_datasets(recipe, _split(spaces) or (), folder, progress, cores())

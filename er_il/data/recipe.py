@@ -58,8 +58,12 @@ class Recipe:
             raise DatasetError(f"A camera is named twice in {', '.join(self.cameras)}.")
 
     @classmethod
-    def load(cls, task: str) -> "Recipe":
+    def load(cls, task: str, arm: str | None = None) -> "Recipe":
         """Read the shipped recipe of a task, such as ``reach_cup``.
+
+        Args:
+            task: Name of the task.
+            arm: Preset to record with instead of the recipe's.
 
         Raises:
             UnknownNameError: there is no recipe of that name.
@@ -68,7 +72,8 @@ class Recipe:
         path = data_dir("datasets") / f"{task}{SUFFIX}"
         if task not in recipe_names():
             raise UnknownNameError("task", task, recipe_names())
-        return cls.from_file(path)
+        recipe = cls.from_file(path)
+        return recipe if arm is None else dataclasses.replace(recipe, arm=arm)
 
     @classmethod
     def from_file(cls, path: Path) -> "Recipe":

@@ -30,7 +30,7 @@ POLICY_ROWS = 25
 def environment_of(
     policy: Path, task: str, decoder_name: str, on_invalid: str = BEST_EFFORT, posture: Sequence[float] = ()
 ) -> ErIlEnvConfig:
-    """Build the environment that a policy needs: its rotation code, its cameras."""
+    """Build the environment that a policy needs: its arm, its rotation code, its cameras."""
     chosen = decoder(decoder_name)
     contract = policy_contract(policy)
     images = _load_config(policy).image_features
@@ -41,6 +41,7 @@ def environment_of(
         resolution=chosen.resolution,
         posture=list(posture),
         rotation=Quaternion.kind if contract.rotation == NONE else contract.rotation,
+        arm=contract.arm,
         on_invalid=on_invalid,
         cameras=[key.removeprefix(f"{OBS_IMAGES}.") for key in images],
         image_size=sizes.pop() if sizes else ErIlEnvConfig.image_size,
