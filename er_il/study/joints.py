@@ -32,6 +32,7 @@ Demos = Mapping[str, Sequence[JointPath]]  # by task or dataset
 
 WORKSPACE = 1000  # configurations, uniform within the joint limits
 WORKSPACE_SEED = 0
+FEW_JOBS = 14  # no more are done sooner than worker processes start
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,7 @@ def study_joints(arm: Arm, demos: Demos, workers: int, advance: Callable[[int, i
     Args:
         arm: The arm.
         demos: Demonstrations, if any.
-        workers: Number of worker processes; with one, no process is started.
+        workers: Number of worker processes, if there is much to measure.
         advance: Called with the number of measurements done, and their total.
 
     Raises:
@@ -111,7 +112,7 @@ def study_joints(arm: Arm, demos: Demos, workers: int, advance: Callable[[int, i
     jobs = [(over_workspace, arm, choice, q, over[choice]) for choice in every]
     for name, of_set in paths.items():
         jobs += [(along_demos, arm, choice, of_set, [each[choice] for each in along[name]]) for choice in every]
-    measured = run_jobs(jobs, workers, advance)
+    measured = run_jobs(jobs, workers if len(jobs) > FEW_JOBS else 1, advance)
     sets = [dict(zip(every, measured[i : i + len(every)], strict=True)) for i in range(0, len(measured), len(every))]
     workspace, of_demos = sets[0], dict(zip(demos, sets[1:], strict=True))
     best = ranking(workspace, of_demos)[0]

@@ -1,0 +1,98 @@
+"""``er-il advise`` for presets, URDFs and datasets, and what it refuses."""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from chains import write_chain
+from lerobot.datasets import LeRobotDataset
+
+from er_il import Arm
+from er_il.cli import main
+
+PANDA = Arm.preset("panda")
+MOTORS = [f"motor_{i}" for i in range(1, 8)]
+
+
+@pytest.fixture
+def advise(monkeypatch, capsys, tmp_path):
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: object) -> str:
+        monkeypatch.setattr(sys, "argv", ["er-il", "advise", *map(str, arguments)])
+        main()
+        return capsys.readouterr().out.replace("\n", " ")
+
+    return run
+
+
+def write_dataset(root: Path) -> Path:
+    """A dataset that does not know its arm: a Panda's motors in degrees, its elbow swinging about the vertical."""
+    names = [*MOTORS, "gripper"]
+    feature = {"dtype": "float32", "shape": (8,), "names": names}
+    dataset = LeRobotDataset.create("lab/arm", 20, {"action": feature}, root=root, robot_type="arm", use_videos=False)
+    for _ in range(2):
+        for share in np.linspace(0, 2 * np.pi, 25):
+            q = PANDA.home + 0.3 * np.sin(share) * np.array([1, 0, -1, 0, 0, 0, 0])
+            frame = np.append(np.rad2deg(q), 1.0).astype(np.float32)
+            dataset.add_frame({"action": frame, "task": "swing"})
+        dataset.save_episode()
+    dataset.finalize()
+    return root
+
+
+@pytest.mark.slow
+def test_a_dataset_is_advised_for_its_demonstrations(advise, tmp_path):
+    write_dataset(tmp_path / "my_robot")
+    said = advise("my_robot", "--arm", "panda", "--units", "deg", "--joints", *MOTORS, "--json", "advice.json")
+    report = json.loads(Path("advice.json").read_text())
+    assert list(report["demos"]) == ["my_robot"]
+    fitness = {each["joints"][0]: each for each in report["demos"]["my_robot"]}
+    assert fitness["panda_joint1"]["configurations"] == 50
+    assert report["recommended"][0] in ("panda_joint1", "panda_joint3")
+    assert fitness["panda_joint2"]["folds"] >= 1  # its elbow passes the highest point
+    assert fitness["panda_joint4"]["risk"] > 0.9
+    assert "of the steps of my_robot" in said
+    assert "redundancy lies among the joints that twist" in said
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["six.urdf", "--ee-frame", "tool"], "chain6 has 6 joints and so no redundancy"),
+        (["six.urdf"], "give --ee-frame too"),
+        (["six.urdf", "--ee-frame", "hand"], "has no end-effector frame 'hand'"),
+        (["absent.urdf", "--ee-frame", "tool"], "There is no file absent.urdf. Presets are panda"),
+        (["nothing_here"], "nothing_here is not a LeRobot v3 dataset"),
+        (["panda", "--arm", "xarm7"], "--arm and --arms are for datasets"),
+    ],
+)
+def test_mistakes_are_one_line(advise, capsys, tmp_path, arguments, complaint):
+    write_chain(tmp_path / "six.urdf", 6)
+    with pytest.raises(SystemExit) as left:
+        advise(*arguments)
+    assert left.value.code == 2
+    assert complaint in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_the_joints_of_a_urdf_by_file_are_advised_with_figures(advise, tmp_path):
+    write_chain(tmp_path / "eight.urdf", 8)
+    joints = [f"j{i}" for i in range(2, 9)]
+    said = advise("eight.urdf", "--ee-frame", "tool", "--urdf-joints", *joints, "--json", "a.json", "--plot", "a.png")
+    report = json.loads(Path("a.json").read_text())
+    assert report["joints"] == joints
+    assert report["demos"] == {}
+    risks = {each["joints"][0]: each["risk"] for each in report["workspace"]}
+    assert report["recommended"] == [min(risks, key=lambda joint: risks[joint])]
+    assert f"Command {report['recommended'][0]}: {min(risks.values()):.1%} of the workspace" in said
+    assert Path("a.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_a_dataset_that_does_not_know_its_arm_must_be_told(advise, capsys, tmp_path):
+    write_dataset(tmp_path / "my_robot")
+    with pytest.raises(SystemExit):
+        advise("my_robot")
+    assert "give --arm, and --joints" in capsys.readouterr().err

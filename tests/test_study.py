@@ -1,0 +1,196 @@
+"""The studies of invalid actions and of ERJ's joints: what they measure, say and write."""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from er_il import Arm, Status
+from er_il.cli import main
+from er_il.errors import DatasetError
+from er_il.joint_choice import choices
+from er_il.study.joint_notes import notes
+from er_il.study.prediction import predict, read_training
+from er_il.study.validity import SIZES, Cell, measure, study_validity
+from er_il.study.validity_report import report as validity_report
+
+PANDA = Arm.preset("panda")
+
+
+def run(monkeypatch, *arguments: object) -> None:
+    monkeypatch.setattr(sys, "argv", ["er-il", *map(str, arguments)])
+    main()
+
+
+def near_home(count: int) -> np.ndarray:
+    return PANDA.home + np.random.default_rng(0).uniform(-0.2, 0.2, (count, 7))
+
+
+@pytest.mark.parametrize(("space", "mode"), [("task", "delta"), ("erj", "absolute"), ("era", "delta")])
+def test_larger_actions_are_more_often_invalid(space, mode):
+    states = near_home(40)
+    outcomes = [
+        measure(Cell(space, mode, "demos", True, size), PANDA, states) for size in (SIZES[0], SIZES[2], SIZES[-1])
+    ]
+    invalid = [outcome.actions - outcome.statuses[Status.OK] for outcome in outcomes]
+    assert invalid == sorted(invalid)
+    assert invalid[0] < 4
+    assert invalid[-1] > 20
+    again = measure(outcomes[1].cell, PANDA, states)
+    assert (again.statuses, again.iterations) == (outcomes[1].statuses, outcomes[1].iterations)
+
+
+def test_causes_are_told_apart():
+    """Small changes of a stretched arm leave its reach, of an arm at its limits its limits, and large ones jump."""
+    stretched = np.array([0.0, 0.6, 0.0, -0.08, 0.0, 1.6, 0.8])
+    at_limit = PANDA.home.copy()
+    at_limit[5] = PANDA.upper[5] - 0.01
+
+    def causes(q: np.ndarray, size: float) -> dict[str, int]:
+        outcome = measure(Cell("erj", "delta", "random", True, size), PANDA, np.tile(q, (60, 1)))
+        return outcome.report()["causes"]
+
+    out, limited, far = causes(stretched, 0.05), causes(at_limit, 0.02), causes(PANDA.home, 0.2)
+    assert out["unreachable"] > 30 > out["limit"] > out["jump"]
+    assert limited["limit"] > 20 > limited["unreachable"] == limited["jump"] == 0
+    assert far["jump"] > 2 * (far["unreachable"] + far["limit"]) > 0
+
+
+def test_all_spaces_get_the_same_states_and_errors_and_the_report_adds_up():
+    told = []
+    outcomes = study_validity(PANDA, near_home(10), 1, 1, lambda done, total: told.append((done, total)))
+    assert told[-1] == (len(outcomes), len(outcomes)) == (120, 120)
+    report = validity_report(outcomes)
+    assert sum(row["actions"] for row in report["pooled"]) == sum(cell["actions"] for cell in report["cells"]) == 120
+    for row in report["pooled"]:
+        assert sum(row["causes"].values()) == row["invalid"]
+    assert [finding.split()[0] for finding in report["findings"]] == ["Around", "Around", "Without", "Decoding"]
+    assert "(paper 13 ms)" in report["findings"][-1]
+
+
+def fitness(joint: str, risk: float, self_motion: float = 0.3) -> dict:
+    return {
+        "joints": [joint],
+        "risk": risk,
+        "self_motion": self_motion,
+        "missed": 0.02,
+        "smallest_p05": 0.03,
+        "folds": 0,
+    }
+
+
+def joint_report(**changes) -> dict:
+    joints = ("j1", "j2", "j3")
+    workspace = [fitness("j1", 0.2, 0.4), fitness("j2", 0.6, 0.1), fitness("j3", 0.3, 0.5)]
+    report = {
+        "arm": "arm",
+        "joints": list(joints),
+        "twisting": ["j1", "j3"],
+        "default": ["j1"],
+        "recommended": ["j1"],
+        "ranking": [["j1"], ["j3"], ["j2"]],
+        "workspace": workspace,
+        "demos": {"reach": [fitness("j1", 0.0), fitness("j2", 0.7), fitness("j3", 0.1)]},
+        "near_singularity": [],
+        "settings": {"singular": 0.02},
+    }
+    return report | changes
+
+
+def test_what_is_said_follows_from_the_numbers():
+    said = " ".join(notes(joint_report()))
+    assert "Command j1: 0.0% of the steps of reach" in said
+    assert "redundancy lies among the joints that twist, j1, j3" in said
+    assert "Breaks here: j2 (70%)" in said
+    assert "No demonstration comes near a singularity" in said
+    near = [{"demos": "reach", "episode": 3, "first": 4, "last": 9, "smallest": 0.01}]
+    mixed = [fitness("j1", 0.2, 0.1), fitness("j2", 0.6, 0.4), fitness("j3", 0.3, 0.5)]
+    said = " ".join(notes(joint_report(near_singularity=near, workspace=mixed, default=["j3"])))
+    assert "reach episode 3, steps 4 to 9" in said
+    assert "among the joints that twist" not in said
+    assert "ask for erj@j1" in said
+
+
+def cells(*successes: int) -> list[dict]:
+    return [
+        {"task": "reach", "decoder": decoder, "successes": count, "episodes": 50, "interval": [count / 50 - 0.1, 1.0]}
+        for decoder, count in zip(("erj", "erj@j2", "erj@j3"), successes, strict=True)
+    ]
+
+
+def test_the_advice_is_checked_against_training():
+    (right,) = predict(joint_report(), cells(50, 3, 40))
+    assert right["rank_correlation"] == pytest.approx(1.0)
+    assert right["top_choice_is_best"] and right["top_choice"] == "j1"
+    (wrong,) = predict(joint_report(), cells(10, 50, 30))
+    assert wrong["rank_correlation"] == pytest.approx(-1.0)
+    assert not wrong["top_choice_is_best"] and not wrong["top_choice_within_interval_of_best"]
+    (alike,) = predict(joint_report(demos={}), cells(50, 50, 50))
+    assert alike["rank_correlation"] is None
+    assert [row["risk"] for row in alike["choices"]] == [0.2, 0.6, 0.3]  # no demos of that task: the workspace
+
+
+def test_training_reports_are_read_and_others_refused(tmp_path):
+    path = tmp_path / "results.json"
+    other = {"task": "reach", "decoder": "joint", "successes": 1, "episodes": 2, "interval": [0, 1], "more": 1}
+    path.write_text(json.dumps({"cells": [*cells(1, 2, 3), other]}))
+    assert [cell["decoder"] for cell in read_training(path)] == ["erj", "erj@j2", "erj@j3"]
+    for text in ("{}", "[]", "no json", '{"cells": [{"task": "reach"}]}'):
+        path.write_text(text)
+        with pytest.raises(DatasetError, match="is no report of rollouts"):
+            read_training(path)
+    with pytest.raises(DatasetError, match="There is no"):
+        read_training(tmp_path / "absent.json")
+
+
+@pytest.mark.slow
+def test_the_studies_run_on_recorded_demonstrations(tmp_path, monkeypatch, capsys):
+    training = tmp_path / "training.json"
+    rows = [
+        {**cell, "task": "reach_cup", "decoder": cell["decoder"].replace("@j", "@panda_joint")}
+        for cell in cells(50, 3, 9)
+    ]
+    training.write_text(json.dumps({"cells": rows}))
+    run(
+        monkeypatch,
+        "study",
+        "joints",
+        "reach_cup",
+        "--episodes",
+        1,
+        "--training",
+        training,
+        "--out",
+        tmp_path / "joints",
+    )
+    report = json.loads((tmp_path / "joints/report.json").read_text())
+    assert report["recommended"] == ["panda_joint1"]
+    assert len(report["workspace"]) == len(report["demos"]["reach_cup"]) == len(choices(PANDA))
+    assert report["training"][0]["top_choice_is_best"]
+    assert report["meta"]["git"] and report["meta"]["versions"]["placo"]
+    assert "redundancy lies among the joints that twist" in capsys.readouterr().out.replace("\n", " ")
+    dataset = tmp_path / "joints/demos/reach_cup/joint"
+    run(monkeypatch, "study", "validity", dataset, "--samples", 2, "--out", tmp_path / "validity")
+    report = json.loads((tmp_path / "validity/report.json").read_text())
+    assert report["meta"]["demos"] == {"reach_cup": 1}
+    for picture in ("joints/joints.png", "validity/validity.png"):
+        assert (tmp_path / picture).read_bytes()[:4] == b"\x89PNG"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["validity", "reach_the_moon"], "Unknown dataset or task 'reach_the_moon'. Valid: the folder of a dataset"),
+        (["validity", "--samples", "0"], "0 samples are too few"),
+        (["joints", "--training", "absent.json"], "There is no absent.json"),
+        (["joints", str(Path(__file__).parent)], "is not a LeRobot v3 dataset"),
+    ],
+)
+def test_mistakes_are_one_line(monkeypatch, capsys, tmp_path, arguments, complaint):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as left:
+        run(monkeypatch, "study", *arguments)
+    assert left.value.code == 2
+    assert complaint in capsys.readouterr().err
