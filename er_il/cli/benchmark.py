@@ -31,6 +31,7 @@ def benchmark(
     from er_il.benchmark.page import PAGE, write_pages
     from er_il.benchmark.plan import Plan
     from er_il.benchmark.report import write_results
+    from er_il.benchmark.strip import copy_strips, strips
     from er_il.benchmark.view import View
     from er_il.cli.table import results_table
     from er_il.schedule import Schedule
@@ -44,11 +45,18 @@ def benchmark(
         view = View(Account(plan, schedule), schedule, executor, console)
         with Live(view, console=console, refresh_per_second=2):
             schedule.run(executor, view.update)
-    folder = results or Path("results") / grid.stem
-    report = write_results(plan, folder)
+        folder = results or Path("results") / grid.stem
+        report = write_results(plan, folder)
+        console.print("The results are written; pictures follow.", highlight=False)
+        pictures = strips(plan)
+        drawing = Schedule(pictures.values())
+        drawing.run(executor)
+    copy_strips(pictures, folder)
     write_pages(folder)
     console.print(results_table(report["cells"]))
     console.print(f"{folder / PAGE}", highlight=False, soft_wrap=True)
+    for message in drawing.failed.values():
+        console.print(f"No strip: {message}", highlight=False)
     for message in schedule.failed.values():
         console.print(f"Failed: {message}", style="red", highlight=False)
     if schedule.failed:
