@@ -2,6 +2,8 @@
 
 import hashlib
 import json
+import os
+import shutil
 import sys
 
 import numpy as np
@@ -272,11 +274,15 @@ def test_commands_that_cannot_work_are_one_line(places, tmp_path, monkeypatch, c
     (old / "meta").mkdir(parents=True)
     old_info = json.loads((source / "meta/info.json").read_text()) | {"codebase_version": "v2.1"}
     (old / "meta/info.json").write_text(json.dumps(old_info))
+    killed = tmp_path / "killed"  # LeRobot writes the end of its files last
+    shutil.copytree(source, killed)
+    os.truncate(next(killed.glob("data/*/*.parquet")), 100)
     panda = ("--to", "erj", "--arm", "panda", "--joints", *LEFT_JOINTS)
     for arguments, message in (
         (("encode", tmp_path / "none", *panda, *out), "is not a LeRobot v3 dataset"),
         (("encode", "nobody/nothing", *panda, *out), "nobody/nothing is neither a folder nor a dataset that LeRobot"),
         (("encode", old, *panda, *out), "version v2.1, not v3.0"),
+        (("encode", killed, *panda, *out), "is damaged, as by a recording that was killed"),
         (("encode", source, "--to", "erj", *out), "does not say which arm it is of"),
         (("encode", source, "--to", "polar", *panda[2:], *out), "Unknown action space 'polar'"),
         (("encode", places / "erj", *panda, *out), "leave out --arm"),
@@ -287,7 +293,7 @@ def test_commands_that_cannot_work_are_one_line(places, tmp_path, monkeypatch, c
         error = capsys.readouterr().err.strip()
         assert message in error
         assert len(error.splitlines()) == 1, error
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["old"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["killed", "old"]
 
 
 def test_an_arm_of_a_file_needs_it_only_once(places, tmp_path, monkeypatch, capsys):

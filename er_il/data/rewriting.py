@@ -20,6 +20,7 @@ from lerobot.datasets.utils import DatasetInfo
 from numpy.typing import NDArray
 
 from er_il.data.schema import Feature
+from er_il.errors import DatasetError
 
 Floats = NDArray[np.float32]
 Stats = dict[str, dict[str, NDArray[Any]]]
@@ -40,14 +41,24 @@ class Column:
 
 def read_vectors(dataset: Path, column: str) -> Floats:
     """Read a column of vectors (N, dim), a row a frame, in the order of the data's files."""
-    return np.concatenate([_vectors(pq.read_table(path, columns=[column]), column) for path in data_files(dataset)])
+    return np.concatenate([_vectors(_read(path, column), column) for path in data_files(dataset)])
 
 
 def read_episode_numbers(dataset: Path) -> NDArray[np.int64]:
     """Read the episode (N,) of each frame, in the order of the data's files."""
-    return np.concatenate(
-        [pq.read_table(path, columns=[EPISODE]).column(EPISODE).to_numpy() for path in data_files(dataset)]
-    )
+    return np.concatenate([_read(path, EPISODE).column(EPISODE).to_numpy() for path in data_files(dataset)])
+
+
+def _read(path: Path, *columns: str) -> pa.Table:
+    """Read a file's columns, all by default.
+
+    Raises:
+        DatasetError: the file is not whole, as LeRobot leaves it when a recording is killed.
+    """
+    try:
+        return pq.read_table(path, columns=list(columns) or None)
+    except pa.ArrowInvalid as error:
+        raise DatasetError(f"{path} is damaged, as by a recording that was killed: {error}") from error
 
 
 def episode_slices(numbers: NDArray[np.int64]) -> list[slice]:
@@ -105,7 +116,7 @@ def rewrite(
     stats: dict[int, Stats] = {}
     done = 0
     for path in data_files(source):
-        table = pq.read_table(path)
+        table = _read(path)
         rows = slice(done, done + len(table))
         done = rows.stop
         values = {name: column.values[rows] for name, column in columns.items()}
@@ -115,7 +126,7 @@ def rewrite(
             advance(frames.stop - frames.start)
         write_table_one_row_group_per_episode(_with_columns(table, values, schema), _new(target, source, path))
     for path in _parquet_files(source.joinpath(*_EPISODES)):
-        pq.write_table(_with_stats(pq.read_table(path), stats), _new(target, source, path))
+        pq.write_table(_with_stats(_read(path), stats), _new(target, source, path))
     # LeRobot adds one episode after the other; the same order gives the same digits.
     total: Stats = functools.reduce(
         lambda sofar, each: aggregate_stats([sofar, each]), (stats[episode] for episode in sorted(stats))
