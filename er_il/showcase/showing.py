@@ -27,7 +27,8 @@ def telling_seed(cells: Sequence[Cell]) -> int:
     def tells(index: int) -> int:
         outcomes = [(cell.decoder.startswith("task"), cell.episodes[index]) for cell in cells]
         return sum(
-            2 * (episode.success != task) + (task and episode.failure.startswith(COLLISION)) for task, episode in outcomes
+            2 * (episode.success != task) + (task and episode.failure.startswith(COLLISION))
+            for task, episode in outcomes
         )
 
     return cells[0].episodes[max(range(len(cells[0].episodes)), key=tells)].seed
