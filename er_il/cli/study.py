@@ -107,9 +107,47 @@ def validity(
     console.print(f"{out / REPORT}\n{out / 'validity.png'}", highlight=False, soft_wrap=True)
 
 
+def deltas(
+    demos: Positional[tuple[str, ...]] = ("reach_cup",),
+    *,
+    episodes: int = 10,
+    out: Path = Path("outputs/study/deltas"),
+) -> None:
+    """Do changes add up? Demonstrations as deltas in every space, decoded one after the other.
+
+    Args:
+        demos: Folders of datasets of one arm, or tasks to record.
+        episodes: Demonstrations to record of a task, or to look at in a dataset.
+        out: Folder of report.json and the recorded demonstrations.
+    """
+    from rich.console import Console
+
+    from er_il.cli.progress import make_progress
+    from er_il.provenance import provenance
+    from er_il.study.deltas import study_deltas
+    from er_il.study.demos import study_demos
+    from er_il.study.reports import write_report
+    from er_il.workers import cores
+
+    console = Console()
+    with make_progress(console) as progress:
+        arm, of_sets = study_demos(demos, episodes, out / "demos", progress, cores())
+    report = study_deltas(arm, of_sets)
+    meta = provenance() | {"arm": arm.name, "demos": {name: len(paths) for name, paths in of_sets.items()}}
+    write_report({"meta": meta} | report, out / REPORT)
+    for each in report["drifts"]:
+        console.print(
+            f"{each['space']}: {each['steps']} steps, joints off by {each['joints']:.1e} rad at most, "
+            f"end effector by {each['position']:.1e} m, {each['invalid']} invalid",
+            highlight=False,
+        )
+    console.print(str(out / REPORT), highlight=False, soft_wrap=True)
+
+
 Study = (
     Annotated[Any, subcommand("validity", constructor=validity, prefix_name=False)]
     | Annotated[Any, subcommand("joints", constructor=joints, prefix_name=False)]
+    | Annotated[Any, subcommand("deltas", constructor=deltas, prefix_name=False)]
 )
 
 
