@@ -123,6 +123,12 @@ def test_every_command_is_run_or_the_page_says_why_not(page: str, monkeypatch: p
             assert name == "er-il" or not options, f"{span}: show it in a block, where it is run"
 
 
+@pytest.mark.parametrize("page", PAGES)
+def test_links_and_pictures_lead_somewhere(page: str):
+    for target in re.findall(r"\]\((?!https?://)([^)#]+)", prose(page)):
+        assert (ROOT / page).parent.joinpath(target).exists(), target
+
+
 def prose(page: str) -> str:
     """A page without its fenced blocks."""
     return re.sub(r"^```.*?^```$", "", (ROOT / page).read_text(), flags=re.MULTILINE | re.DOTALL)

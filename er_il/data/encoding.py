@@ -138,7 +138,10 @@ def dataset_layout(features: dict[str, Feature]) -> Layout:
     """
     spec = (features[ACTION].get("info") or {}).get(SPEC)
     if spec is None:
-        raise DatasetError("The dataset does not say what its actions mean: er-il encode did not write it.")
+        raise DatasetError(
+            "The dataset does not say what its actions mean. Write it again so that it does, as it is or in another "
+            "space: er-il encode DATASET --to joint --arm panda --out OUT."
+        )
     return Layout.from_spec(spec)
 
 
