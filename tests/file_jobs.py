@@ -4,8 +4,10 @@ import json
 import os
 import signal
 import time
-from dataclasses import dataclass
+from concurrent.futures import Future
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import gymnasium
 
@@ -57,6 +59,20 @@ class FileJob:
         partial = self.path.with_suffix(".partial")
         partial.write_text(json.dumps(result))
         partial.rename(self.path)
+
+
+@dataclass
+class InOrder:
+    """Runs one function after the other in this process, and keeps what it ran."""
+
+    workers: int = 1
+    ran: list[str] = field(default_factory=list)
+
+    def submit(self, function: Any, /, *arguments: Any) -> "Future[Any]":
+        self.ran.append(arguments[0].name)
+        future: Future[Any] = Future()
+        future.set_result(function(*arguments))
+        return future
 
 
 def simulated(seed: int) -> list[float]:

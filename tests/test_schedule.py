@@ -5,32 +5,16 @@ import signal
 import subprocess
 import sys
 import time
-from concurrent.futures import Future
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import pytest
-from file_jobs import FileJob, graph
+from file_jobs import FileJob, InOrder, graph
 
 from er_il.schedule import ATTEMPTS, Schedule
 from er_il.workers import LocalExecutor
 
 TESTS = Path(__file__).parent
-
-
-@dataclass
-class InOrder:
-    """Runs one function after the other in this process, and keeps what it ran."""
-
-    workers: int = 1
-    ran: list[str] = field(default_factory=list)
-
-    def submit(self, function: Any, /, *arguments: Any) -> "Future[Any]":
-        self.ran.append(arguments[0].name)
-        future: Future[Any] = Future()
-        future.set_result(function(*arguments))
-        return future
 
 
 def test_needs_come_first_and_what_is_there_is_not_done_again(tmp_path: Path) -> None:

@@ -1,11 +1,13 @@
 """Jobs on a Ray cluster whose machines share the folder of results (and have er_il installed)."""
 
+import socket
 from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any
 
 from er_il.errors import ErIlError
 
+PATIENCE = 10.0  # [s] for the cluster to answer
 RETRIES = 3  # of a job whose process or machine died under it
 _ONE_THREAD = {"env_vars": {"OMP_NUM_THREADS": "1"}}
 
@@ -27,9 +29,12 @@ class RayExecutor:
         self._ray, self._address = ray, address
 
     def __enter__(self) -> "RayExecutor":
+        host, _, port = self._address.rpartition(":")
         try:
+            if host and port.isdigit():  # Ray itself would try for minutes
+                socket.create_connection((host.removeprefix("ray://"), int(port)), timeout=PATIENCE).close()
             self._ray.init(self._address, runtime_env=_ONE_THREAD, log_to_driver=False)
-        except (ConnectionError, ValueError) as error:
+        except (OSError, OverflowError, ValueError) as error:
             raise ErIlError(f"No Ray cluster at {self._address}: {error}") from error
         return self
 

@@ -18,7 +18,7 @@ from er_il.showcase.showing import telling_seed
 DECODERS = ("joint", "erj", "task-nearest", "task-posture")  # as far as the grid has them
 PICTURES = 5  # of a rollout
 FILM_EVERY = 4  # control steps
-COLOURS = 128  # of a palette: a strip of its own colours takes three times the space
+COLOURS = 256  # of a palette: a strip of its own colours takes three times the space
 
 NAME = "strip_{}.png"  # of a task, among the results
 

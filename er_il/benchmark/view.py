@@ -29,28 +29,32 @@ class View:
         """Count what is new; say which cells are complete, for logs too."""
         for entry in self.account.update():
             score = self.account.scores[entry]
+            count = f", trained on {entry.demonstrations}" * self._several
             self.console.print(
-                f"{entry.task} {entry.decoder}, {entry.demonstrations} demonstrations: "
-                f"{score.successes}/{score.total} ({self._state()})",
+                f"{entry.task} {entry.decoder}{count}: {score.successes}/{score.total} ({self._state()})",
                 highlight=False,
+                soft_wrap=True,
             )
 
     def __rich__(self) -> RenderableType:
         table = Table(box=None, header_style="bold")
         grid = self.account.plan.grid
         names = (*grid.decoders, *grid.sceptics)
-        several = len(grid.demonstrations) > 1
-        for heading in ("Task", *(["Demos"] if several else [])):
+        for heading in ("Task", *["Demos"] * self._several):
             table.add_column(heading)
         for name in names:
             table.add_column(name, justify="right")
         for task in grid.tasks:
             for count in grid.demonstrations:
                 scores = [self.account.scores[Entry(task, name, count)] for name in names]
-                table.add_row(task, *([str(count)] if several else []), *map(_shown, scores))
+                table.add_row(task, *[str(count)] * self._several, *map(_shown, scores))
         running = [Text(f"  {_described(job, start)}") for job, start in list(self.schedule.running.items())[:SHOWN]]
         failed = [Text(f"  failed: {message}", style="red") for message in self.schedule.failed.values()]
         return Group(table, *running, *failed, Text(self._state(), style="bold"))
+
+    @property
+    def _several(self) -> bool:
+        return len(self.account.plan.grid.demonstrations) > 1
 
     def _state(self) -> str:
         remaining = self.account.remaining(self.executor.workers)

@@ -47,7 +47,7 @@ def benchmark(
             schedule.run(executor, view.update)
         folder = results or Path("results") / grid.stem
         report = write_results(plan, folder)
-        console.print("The results are written; pictures follow.", highlight=False)
+        console.print("\nThe results are written; pictures follow.", highlight=False)
         pictures = strips(plan)
         drawing = Schedule(pictures.values())
         drawing.run(executor)

@@ -1,0 +1,291 @@
+"""A benchmark: what a grid may say, what is counted, what is shown; and a tiny one from end to end."""
+
+import csv
+import gzip
+import json
+import os
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from documented import documented, run
+from file_jobs import InOrder
+from matplotlib.image import imread
+
+from er_il.arm import Arm
+from er_il.benchmark.grid import Entry, Grid, GridError
+from er_il.benchmark.page import write_pages
+from er_il.benchmark.plan import Plan
+from er_il.benchmark.report import cell_report, write_results
+from er_il.benchmark.table import compact_table
+from er_il.cli.benchmark import benchmark
+from er_il.errors import ErIlError, UnknownNameError
+from er_il.policy.elbow import ElbowReference
+from er_il.policy.evaluation import Cell, Episode
+from er_il.policy.postures import grasp_posture, mean_posture
+from er_il.schedule import Schedule
+
+PANDA = Arm.preset("panda")
+TINY = {
+    "title": "Tiny",
+    "tasks": ["reach_cup"],
+    "decoders": ["joint", "task-nearest"],
+    "demonstrations": [1],
+    "training_seeds": [0],
+    "rollouts": 2,
+    "episodes": 2,
+    "steps": 2,
+}
+
+
+def grid(**changes: object) -> Grid:
+    return Grid.from_dict(TINY | changes)
+
+
+def test_mistakes_in_a_grid_name_the_valid_choices(tmp_path: Path) -> None:
+    with pytest.raises(GridError, match=r"A grid has no task. Valid: title, tasks, decoders"):
+        grid(task="reach_cup")
+    with pytest.raises(GridError, match="The grid lacks tasks, rollouts"):
+        Grid.from_dict({key: value for key, value in TINY.items() if key not in ("tasks", "rollouts")})
+    with pytest.raises(UnknownNameError, match=r"Unknown task 'cup'. Valid: .*reach_cup"):
+        grid(tasks=["cup"])
+    with pytest.raises(UnknownNameError, match=r"Unknown decoder 'task'. Valid: .*task-nearest"):
+        grid(decoders=["task"])
+    with pytest.raises(UnknownNameError, match=r"Unknown sceptic's decoder 'joint'. Valid: task-mean, task-grasp"):
+        grid(sceptics=["joint"])
+    with pytest.raises(GridError, match="list it under sceptics"):
+        grid(decoders=["task-mean"])
+    with pytest.raises(GridError, match="tasks is 'reach_cup', not a list of names"):
+        grid(tasks="reach_cup")
+    with pytest.raises(GridError, match="training_seeds names 1 twice"):
+        grid(training_seeds=[1, 1])
+    with pytest.raises(GridError, match="decoders is empty"):
+        grid(decoders=[])
+    with pytest.raises(GridError, match="rollouts is 0"):
+        grid(rollouts=0)
+    with pytest.raises(GridError, match="demonstrations holds 33, but the recipe of reach_cup has 32"):
+        grid(demonstrations=[4, 33], episodes=None)
+    with pytest.raises(GridError, match="There is no grid"):
+        Grid.from_file(tmp_path / "none.yaml")
+    (tmp_path / "grid.yaml").write_text(yaml.safe_dump(TINY | {"rollouts": "many"}))
+    with pytest.raises(GridError, match=r"grid.yaml: rollouts is 'many', not a whole number"):
+        Grid.from_file(tmp_path / "grid.yaml")
+
+
+@pytest.mark.parametrize("name", ["table1", "data_efficiency"])
+def test_the_shipped_grids_are_grids(name: str) -> None:
+    shipped = Grid.from_file(Path(__file__).parents[1] / "configs" / f"{name}.yaml")
+    assert Grid.from_dict(shipped.to_dict()) == shipped
+    assert "joint" in shipped.decoders  # the others are compared with it
+
+
+def test_jobs_differ_wherever_their_results_may(tmp_path: Path) -> None:
+    wide = grid(
+        decoders=["joint", "task-nearest", "task-posture"], training_seeds=[0, 1], rollouts=60, sceptics=["task-mean"]
+    )
+    jobs = Plan(wide, tmp_path).jobs
+    assert len({job.path for job in jobs}) == len({job.name for job in jobs}) == len(jobs) == 4 * 2 * 3
+    assert sorted((job.first_seed, job.count) for job in jobs[:3]) == [(1000, 25), (1025, 25), (1050, 10)]
+    trained = {job.decoder: job.trained for job in jobs if job.trained.seed == 1}
+    assert trained["task-nearest"] == trained["task-posture"] == trained["task-mean"] != trained["joint"]
+    other = Plan(grid(steps=3), tmp_path).jobs
+    assert not {job.path for job in other} & {job.path for job in jobs}
+
+
+def test_a_folder_belongs_to_one_grid(tmp_path: Path) -> None:
+    (tmp_path / "strange").mkdir()
+    (tmp_path / "strange" / "thesis.tex").touch()
+    with pytest.raises(ErIlError, match="something else than a benchmark"):
+        Plan(grid(), tmp_path / "strange").claim()
+    Plan(grid(), tmp_path / "mine").claim()
+    Plan(grid(decoders=["joint", "erj"], rollouts=9), tmp_path / "mine").claim()  # it may grow
+    with pytest.raises(ErIlError, match="belongs to the grid 'Tiny'"):
+        Plan(grid(title="Other"), tmp_path / "mine").claim()
+    owner = tmp_path / "mine" / "benchmark.json"
+    claim = json.loads(owner.read_text())
+    claim["configurations"]["erj"]["policy"]["dim_model"] = 7
+    owner.write_text(json.dumps(claim))
+    with pytest.raises(ErIlError, match="trained by other configurations than today's, of erj"):
+        Plan(grid(decoders=["erj"]), tmp_path / "mine").claim()
+
+
+def cell(decoder: str, outcomes: str) -> Cell:
+    """Rollouts from an outcome each: o succeeds, x collides."""
+    episodes = [
+        Episode(1000 + i, each == "o", "" if each == "o" else "collision", Counter(ok=2), (1e-3, 2e-3), 0.1, 0.01 * i)
+        for i, each in enumerate(outcomes)
+    ]
+    return Cell("reach_cup", decoder, tuple(episodes))
+
+
+def test_a_cell_is_pooled_over_training_seeds_and_paired_by_them() -> None:
+    joint = {0: cell("joint", "oooo"), 1: cell("joint", "ooox")}
+    erj = {0: cell("erj", "oxoo"), 1: cell("erj", "oooo")}
+    report = cell_report(Entry("reach_cup", "erj", 32), erj, joint)
+    assert (report["successes"], report["episodes"], report["demonstrations"]) == (7, 8, 32)
+    assert report["interval"] == pytest.approx([0.4735, 0.9968], abs=1e-4)
+    assert [(each["training_seed"], each["successes"], each["episodes"]) for each in report["per_seed"]] == [
+        (0, 3, 4),
+        (1, 4, 4),
+    ]
+    paired = report["difference_to_joint"]
+    assert paired["difference"] == 0.0  # one pair better, one worse
+    assert paired["interval"] == pytest.approx([-0.3921, 0.3921], abs=1e-3)
+    assert report["elbow_error"] == pytest.approx(0.015)
+    assert "difference_to_joint" not in cell_report(Entry("reach_cup", "joint", 32), joint, joint)
+
+
+def test_postures_of_the_demonstrations() -> None:
+    joints = np.arange(12.0).reshape(6, 2)
+    taking = np.column_stack([joints, [1, 1, 0, 1, 0, 0]])  # lets go once, and takes again in row 4
+    pressing = np.column_stack([joints, np.ones(6)])
+    assert grasp_posture([taking]) == pytest.approx(joints[4])
+    assert grasp_posture([taking, pressing]) == pytest.approx((joints[4] + joints[5]) / 2)
+    assert mean_posture([taking, pressing[:2]]) == pytest.approx(np.vstack([joints, joints[:2]]).mean(axis=0))
+
+
+def test_the_elbow_is_compared_where_the_hand_is_and_when_it_is_there() -> None:
+    start, swing = np.array(PANDA.home), np.zeros(7)
+    swing[0] = 0.5
+    demo = start + np.linspace(0, 1, 21)[:, None] * swing
+    reference = ElbowReference.of_demos(PANDA, 0.05, [demo])
+    assert reference is not None
+    assert reference.error(demo[::2]) < 0.02  # the same way at twice the speed
+    turned = np.repeat(start[None], 5, axis=0)
+    turned[:, 0] += 0.5
+    radius = np.hypot(*reference.elbows[0][:2])
+    assert reference.error(demo[:1]) == pytest.approx(0.0, abs=1e-9)
+    assert reference.error(turned[:1]) == pytest.approx(0.0, abs=0.01)  # the demonstration was there, too, later
+    folded = start.copy()
+    folded[[0, 2]] = [0.8, -0.8]  # the hand not far from home, the elbow aside
+    assert reference.error(folded[None]) > 0.2 * radius
+
+
+def report(successes: int = 150) -> dict[str, Any]:
+    """The report of a grid of one task, all by one seed."""
+    shapes = [("joint", 200), ("erj", 199), ("task-nearest", 3), ("task-grasp", successes)]
+    cells = []
+    for name, count in shapes:
+        entry = Entry("reach_cup", name, 32)
+        by_seed = {0: cell(name, "o" * count + "x" * (200 - count))}
+        cells.append(cell_report(entry, by_seed, {0: cell("joint", "o" * 200)}))
+    values = TINY | {"decoders": ["joint", "erj", "task-nearest"], "sceptics": ["task-grasp"], "demonstrations": [32]}
+    meta = {
+        "versions": {"python": "3.12"},
+        "machine": {"processor": "a processor", "cores": 2},
+        "title": "A title",
+        "grid": Grid.from_dict(values | {"episodes": None}).to_dict(),
+        "computed_by": ["0123abc"],
+        "training_steps": {"joint": 1500},
+        "rollout_seeds": "1000 to 1199",
+        "costs": {"trainings": 3, "training_cpu_s": 3600, "rollouts": 800, "rollout_cpu_s": 1800},
+        "missing": [],
+    }
+    return {"meta": meta, "cells": cells}
+
+
+def test_the_page_shows_what_was_counted(tmp_path: Path) -> None:
+    (tmp_path / "results.json").write_text(json.dumps(report()))
+    (tmp_path / "strip_reach_cup.png").touch()
+    write_pages(tmp_path)
+    page = (tmp_path / "README.md").read_text()
+    row = "| `reach_cup` | **200/200** (98.2% – 100.0%) | **199/200** (97.2% – 100.0%) | **3/200** (0.3% – 4.3%) |"
+    assert row in compact_table(report()) and row in page
+    assert (tmp_path / "table.md").read_text() in page + "\n"
+    assert "| collision 197 |" in page and "-98.5 (" in page
+    for text in ("A title", "0123abc", "strip_reach_cup.png", "(table.png)", "1.0 h", "0.5 h"):
+        assert text in page
+    assert "200 rollouts a cell instead of 10" in page
+    assert "It is not enough on: `reach_cup`" in page
+    assert imread(tmp_path / "table.png").std() > 0.05
+    (tmp_path / "results.json").write_text(json.dumps(report(successes=200)))
+    write_pages(tmp_path)
+    assert "That is enough on: `reach_cup` (`task-grasp`)" in (tmp_path / "README.md").read_text()
+
+
+def test_several_numbers_of_demonstrations_are_drawn_as_curves(tmp_path: Path) -> None:
+    values = report()
+    few = [each | {"demonstrations": 4, "successes": 40, "interval": [0.15, 0.3]} for each in values["cells"]]
+    values["cells"] = [*few, *values["cells"]]
+    values["meta"]["grid"]["demonstrations"] = [4, 32]
+    (tmp_path / "results.json").write_text(json.dumps(values))
+    write_pages(tmp_path)
+    assert "| `reach_cup` | 4 | **40/200**" in (tmp_path / "README.md").read_text()
+    assert imread(tmp_path / "curves.png").std() > 0.05
+    assert not (tmp_path / "table.png").exists()
+
+
+@pytest.fixture
+def one_core() -> Iterator[None]:
+    """One worker is enough, and imports LeRobot once."""
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(before)})
+    yield
+    os.sched_setaffinity(0, before)
+
+
+def written(folder: Path, pattern: str) -> dict[Path, int]:
+    return {path: path.stat().st_mtime_ns for path in folder.rglob(pattern)}
+
+
+@pytest.mark.slow
+def test_a_grid_from_end_to_end(
+    tmp_path: Path, one_core: None, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    file, results = Path("configs/table1.yaml"), Path("results/table1")  # where the documented command looks
+    out = Path("outputs/benchmark/table1").resolve()
+    file.parent.mkdir()
+    file.write_text(yaml.safe_dump(TINY))
+    plan = Plan(grid(), out)
+    plan.claim()
+    in_the_way = plan.training(Entry("reach_cup", "task-nearest", 1), 0).out / "thesis.tex"
+    in_the_way.parent.mkdir(parents=True)
+    in_the_way.touch()
+
+    with pytest.raises(SystemExit, match="1"):  # one cell fails, is told, and does not stop the other
+        benchmark(file, out=out, results=results)
+    assert "Failed: train reach_cup task" in " ".join(capsys.readouterr().out.split())
+    first = json.loads((results / "results.json").read_text())
+    assert [(each["decoder"], each["episodes"]) for each in first["cells"]] == [("joint", 2)]
+    assert [each["decoder"] for each in first["meta"]["missing"]] == ["task-nearest"]
+
+    in_the_way.unlink()
+    before = written(out, "*.safetensors") | written(out, "1000-*.json") | written(out, "*.parquet")
+    grown = Plan(grid(sceptics=["task-grasp"]), out)
+    grown.claim()
+    executor = InOrder()
+    schedule = Schedule(grown.jobs)
+    schedule.run(executor)
+    assert not schedule.failed
+    assert [name.split()[:3] for name in executor.ran] == [  # neither demonstrations nor joint once more
+        ["train", "reach_cup", "task"],
+        ["roll", "out", "task-nearest"],
+        ["roll", "out", "task-grasp"],
+    ]
+    assert before.items() <= (written(out, "*.safetensors") | written(out, "1000-*.json") | before).items()
+    report = write_results(grown, results)
+    rows = list(csv.DictReader(gzip.decompress((results / "episodes.csv.gz").read_bytes()).decode().splitlines()))
+    assert [(row["decoder"], row["training_seed"], row["seed"]) for row in rows] == [
+        (name, "0", seed) for name in ("joint", "task-nearest", "task-grasp") for seed in ("1000", "1001")
+    ]
+    for each in report["cells"]:
+        own = [row for row in rows if row["decoder"] == each["decoder"]]
+        assert each["successes"] == sum(int(row["success"]) for row in own)
+        assert each["mean_steps"] == np.mean([int(row["steps"]) for row in own])
+        assert each["elbow_error"] == pytest.approx(np.mean([float(row["elbow_error"]) for row in own]), abs=1e-6)
+    nearest, grasp = report["cells"][1:]
+    assert nearest["elbow_error"] != grasp["elbow_error"]  # the posture reached the decoder
+    costs = report["meta"]["costs"]
+    assert (costs["trainings"], costs["rollouts"]) == (2, 6) and costs["training_cpu_s"] > costs["rollout_cpu_s"] > 0
+
+    table = (results / "episodes.csv.gz").read_bytes()
+    run("er-il", *documented("docs/table.md", "er-il benchmark"))  # all is there: it is only reported again
+    assert "2/2 cells" in capsys.readouterr().out
+    assert len(table) > len((results / "episodes.csv.gz").read_bytes())
+    write_results(grown, results)
+    assert (results / "episodes.csv.gz").read_bytes() == table
