@@ -35,6 +35,7 @@ class CupTask(ArmTask):
     surface: float  # z [m] on which the cup stands before a Panda
     centre: tuple[float, float]  # x, y [m] of the cup's mean place
     way: tuple[Via, ...]  # of the leader's hand to the grasp
+    pace: float = 1.0  # of the hand on that way
     way_back: tuple[Via, ...]  # with the cup
     lean: float | None = None  # [rad] of the joints below the base joint, on an arm that has any (or any)
 
@@ -127,7 +128,7 @@ class CupTask(ArmTask):
         reach = plan_stretch(self.arm, self.joint_positions, there, is_free)
         leave = plan_stretch(self.arm, reach[-1], back, is_free)
         script = [
-            Stretch(reach, gripper=1.0),
+            Stretch(reach, gripper=1.0, pace=self.pace),
             Stretch(reach[-1:], gripper=0.0, hold=GRASP_TIME),
             Stretch(leave, gripper=0.0, hold=REST),
         ]

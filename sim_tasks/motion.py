@@ -35,6 +35,7 @@ class Stretch:
     waypoints: np.ndarray  # (K, n) [rad]
     gripper: float  # opening in [0, 1]
     hold: float = 0.0  # [s] rest at the end, for the gripper to act
+    pace: float = 1.0  # share of the script's speed
 
     def sample(self, arm: Arm, period: float, speed: float) -> np.ndarray:
         """Joint angles (T, n) every ``period`` seconds at a share ``speed`` of the velocity limits."""
@@ -46,7 +47,7 @@ class Stretch:
         curve = PchipInterpolator(knots / knots[-1], waypoints)
         grid = np.linspace(0, 1, GRID)
         fastest = np.max(np.abs(np.diff(curve(_ease(grid)), axis=0)) * (GRID - 1) / arm.velocity)  # [s] at full speed
-        steps = max(2, int(np.ceil(fastest / speed / period)))
+        steps = max(2, int(np.ceil(fastest / (speed * self.pace) / period)))
         return np.concatenate([curve(_ease(np.arange(1, steps + 1) / steps)), still])
 
 

@@ -13,6 +13,7 @@ class ReachRemoveCup(RemoveCup):
     arms = ("panda",)
     start = ReachCup.start
     way = ReachCup.way
+    pace = ReachCup.pace
 
     def _collision(self) -> str:
         return "collision_removing" if self._was_freed else "collision_reaching"

@@ -11,11 +11,12 @@ class RemoveCup(CabinetCup):
 
     task = "remove_cup"
     task_description = "Grasp the cup by its stem and take it out of the cabinet, upright."
-    max_steps = 180
+    max_steps = 210
     lean = 0.1
-    start = (0.1, -0.15, -0.11, -2.093, -0.109, 3.166, 0.876)  # inside, before the stem, the elbow up
+    start = (0.1, -0.302, -0.125, -2.244, -0.238, 3.166, 0.981)  # inside, the elbow up, the stem 12 cm ahead
+    pace = 0.5  # else the grasp is over in half a second, too few frames to learn it from
     way = (
-        ((-0.035, 0.0, 0.012), 0.1),  # no lower: the wrist would touch the floor of the compartment
+        ((-0.04, 0.0, 0.012), 0.1),  # no lower: the wrist would touch the floor of the compartment
         ((0.0, 0.0, 0.0), 0.1),
     )
     way_back = (
