@@ -83,10 +83,11 @@ def test_the_pose_changes_along_the_base_frames_axes():
     np.testing.assert_allclose(after[:3, :3] @ before[:3, :3].T, [[c, -s, 0], [s, c, 0], [0, 0, 1]], atol=1e-6)
 
 
-def test_rotations_stay_small_where_quaternions_would_flip():
+@pytest.mark.parametrize("kind", ["task", "erj", "era"])
+def test_rotations_stay_small_where_quaternions_would_flip(kind):
     q = np.tile(PANDA.home, (120, 1))
     q[:, 6] = np.linspace(PANDA.lower[6], PANDA.upper[6], 120)  # the hand turns by 332 degrees
-    changes = delta("erj").encode(q)[1:, 3:6]
+    changes = delta(kind).encode(q)[1:, 3:6]
     np.testing.assert_allclose(np.linalg.norm(changes, axis=1), np.diff(q[:, 6]), atol=1e-9)
 
 

@@ -4,6 +4,7 @@ from chains import chain_arm
 
 from er_il import ActionSpace, Arm, Status, from_spec, make_action_space
 from er_il.arm_angle import ElbowCircle
+from er_il.data.references import fitted
 from er_il.errors import ArmError, SpecError
 from er_il.round_trip import EXACT
 
@@ -68,6 +69,21 @@ def test_the_arm_angle_is_continuous_past_half_a_turn_and_any_turn_decodes():
         other = action.copy()
         other[7] += 2 * np.pi * turn
         np.testing.assert_allclose(space.decode(other, q[20] + 0.01).q, q[20], atol=EXACT)
+
+
+def test_demos_agree_about_the_turn_of_one_arm_angle():
+    """One demo stays below half a turn, another one beyond it: as fitted to both, nothing is torn apart between."""
+    home = make_action_space("era", PANDA)
+    q = _with_arm_angle(home, np.linspace(np.radians(150), np.radians(210), 61), np.random.default_rng(0))
+    demos = (q[:25], q[36:])
+    apart = [home.encode(demo)[:, 7] for demo in demos]
+    assert np.abs(apart[1].mean() - apart[0].mean()) > np.pi
+    space = fitted(home, np.concatenate(demos))
+    together = np.concatenate([space.encode(demo)[:, 7] for demo in demos])
+    np.testing.assert_allclose(np.ptp(together), np.radians(60), atol=5e-3)
+    assert np.all(np.diff(together) > 0)
+    decoded = space.decode(space.encode(demos[1])[0], demos[1][0] + 0.01)
+    np.testing.assert_allclose(decoded.q, demos[1][0], atol=EXACT)
 
 
 def _with_arm_angle(space: ActionSpace, phi: np.ndarray, rng: np.random.Generator) -> np.ndarray:

@@ -3,6 +3,7 @@ import json
 import numpy as np
 import pytest
 from chains import chain_arm, write_chain
+from scipy.spatial.transform import Rotation
 
 from er_il import ActionSpace, Arm, ArmAngleFrames, Status, from_spec, make_action_space
 from er_il.errors import ArmError, ErIlError, ShapeError, SpecError, UnknownNameError
@@ -281,15 +282,17 @@ def test_joint_order_is_part_of_the_arm(tmp_path):
         from_spec(straight.spec(), turned.arm)
 
 
-def test_rotations_are_continuous_along_a_demo_through_half_a_turn():
-    space = make_action_space("erj", PANDA)
+@pytest.mark.parametrize("kind", ["task", "erj", "era"])
+@pytest.mark.parametrize("rotation", ["quat", "rot6d"])
+def test_rotations_are_continuous_along_a_demo_through_half_a_turn(kind, rotation):
+    space = make_action_space(kind, PANDA, rotation=rotation)
     q = np.tile(PANDA.home, (80, 1))
     q[:, 6] = np.linspace(PANDA.lower[6], PANDA.upper[6], 80)  # the hand turns by 332 degrees
-    quaternions = space.encode(q)[:, 3:7]
-    assert np.abs(np.diff(quaternions, axis=0)).max() < 0.1
-    np.testing.assert_allclose(
-        [space.decode(a, row).q for a, row in zip(space.encode(q), q, strict=True)], q, atol=EXACT
-    )
+    turned = Rotation.from_matrix(space.fk(PANDA.home)[:3, :3].T @ space.fk(q[0])[:3, :3]).magnitude()
+    assert turned < np.pi < PANDA.home[6] - PANDA.lower[6]  # past half a turn from where the sign is chosen
+    actions = space.encode(q)
+    assert np.abs(np.diff(actions, axis=0)).max() < 0.1
+    np.testing.assert_allclose([space.decode(a, row).q for a, row in zip(actions, q, strict=True)], q, atol=EXACT)
 
 
 def test_posture_pulls_step_by_step_and_arrives():
