@@ -63,7 +63,8 @@ def generate(recipe: Recipe, spaces: Sequence[str], out: Path, progress: Progres
     for space in asked or ("",):
         check_space(space)
         make_action_space(space, Arm.preset(recipe.arm))  # raises if the arm has none such
-    existing = sorted(info.parents[1].name for info in out.glob("*/meta/info.json"))
+    datasets = {info.parents[1].name for info in out.glob("*/meta/info.json")}
+    existing = sorted(datasets | {space for space in asked if (out / space).exists()})
     for space in existing:
         _check_same(recipe, Record.read(out / space).recipe, out / space)
     new = tuple(space for space in asked if space not in existing)
