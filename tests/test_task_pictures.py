@@ -1,4 +1,4 @@
-"""The pictures of docs/tasks.md are of the demonstrations."""
+"""What docs/tasks.md shows and says is what the tasks are."""
 
 import runpy
 from pathlib import Path
@@ -7,6 +7,10 @@ import numpy as np
 import pytest
 from documented import ROOT, documented
 from PIL import Image
+
+from er_il.data.recipe import Recipe
+from sim_tasks import TASKS
+from sim_tasks.arm_task import RATE, ArmTask
 
 
 @pytest.mark.slow
@@ -22,3 +26,13 @@ def test_a_tasks_picture_shows_its_demonstration(tmp_path: Path):
     assert np.abs(drawn - shown).mean() < 3
     moments = np.split(drawn[:, : 5 * 304 - 4], [304 * i for i in range(1, 5)], axis=1)
     assert np.abs(moments[0][:, :300] - moments[4][:, :300]).mean() > 5
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_the_page_says_how_long_and_how_much_varies(task: type[ArmTask]):
+    sections = (ROOT / "docs" / "tasks.md").read_text().split("\n## ")
+    (section,) = [each for each in sections if f"`{task.task}`" in each.splitlines()[0]]
+    assert f"| {task.max_steps} steps ({task.max_steps / RATE:g} s) |" in section
+    for key, sides in Recipe.load(task.task).randomisation.items():
+        if isinstance(sides, list | tuple) and key != "speed_range":
+            assert f"{100 * sides[0]:g} × {100 * sides[1]:g} cm (`{key}`)" in section
