@@ -1,30 +1,46 @@
 """Render the pages' tables from the results they come from: ``uv run python docs/render_readme.py``.
 
 A block between ``<!-- results/NAME -->`` and ``<!-- /results/NAME -->`` is the table of
-``results/NAME/report.json``.
+``results/NAME/report.json``, or the compact one of a benchmark's ``results/NAME/results.json``.
 """
 
 import json
 import re
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
+from er_il.benchmark import RESULTS
+from er_il.benchmark.table import compact_table
 from er_il.showcase.circle import drift_table
 from er_il.showcase.report import REPORT, success_table
+from er_il.study.tables import deltas_table, joints_table, validity_table
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 BLOCK = re.compile(r"(<!-- (results/\w+) -->\n).*?(<!-- /\2 -->)", re.DOTALL)
 
+# How a report is shown, by a key that only such reports have.
+TABLES: dict[str, Callable[[Mapping[str, Any]], str]] = {
+    "drives": drift_table,
+    "pooled": validity_table,
+    "workspace": joints_table,
+    "drifts": deltas_table,
+    "cells": lambda report: success_table(report["cells"]),
+}
+
 
 def rendered(text: str) -> str:
     """Return the text with every results block filled from its file."""
 
-    def table(block: re.Match[str]) -> str:
+    def filled(block: re.Match[str]) -> str:
+        benchmark = ROOT / block[2] / RESULTS
+        if benchmark.exists():
+            return f"{block[1]}{compact_table(json.loads(benchmark.read_text()))}\n{block[3]}"
         report = json.loads((ROOT / block[2] / REPORT).read_text())
-        rendered_table = drift_table(report) if "drives" in report else success_table(report["cells"])
-        return f"{block[1]}{rendered_table}\n{block[3]}"
+        return f"{block[1]}{next(table(report) for key, table in TABLES.items() if key in report)}\n{block[3]}"
 
-    return BLOCK.sub(table, text)
+    return BLOCK.sub(filled, text)
 
 
 if __name__ == "__main__":

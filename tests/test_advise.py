@@ -2,11 +2,13 @@
 
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 from chains import write_chain
+from documented import documented, run
 from lerobot.datasets import LeRobotDataset
 
 from er_il import Arm
@@ -20,17 +22,17 @@ MOTORS = [f"motor_{i}" for i in range(1, 8)]
 def advise(monkeypatch, capsys, tmp_path):
     monkeypatch.chdir(tmp_path)
 
-    def run(*arguments: object) -> str:
+    def advised(*arguments: object) -> str:
         monkeypatch.setattr(sys, "argv", ["er-il", "advise", *map(str, arguments)])
         main()
         return capsys.readouterr().out.replace("\n", " ")
 
-    return run
+    return advised
 
 
-def write_dataset(root: Path) -> Path:
+def write_dataset(root: Path, motors: Sequence[str] = MOTORS) -> Path:
     """A dataset that does not know its arm: a Panda's motors in degrees, its elbow swinging about the vertical."""
-    names = [*MOTORS, "gripper"]
+    names = [*motors, "gripper"]
     feature = {"dtype": "float32", "shape": (8,), "names": names}
     dataset = LeRobotDataset.create("lab/arm", 20, {"action": feature}, root=root, robot_type="arm", use_videos=False)
     for _ in range(2):
@@ -44,10 +46,10 @@ def write_dataset(root: Path) -> Path:
 
 
 @pytest.mark.slow
-def test_a_dataset_is_advised_for_its_demonstrations(advise, tmp_path):
-    write_dataset(tmp_path / "my_robot")
-    said = advise("my_robot", "--arm", "panda", "--units", "deg", "--joints", *MOTORS, "--json", "advice.json")
-    report = json.loads(Path("advice.json").read_text())
+def test_a_dataset_is_advised_for_its_demonstrations_then_encoded(advise, tmp_path):
+    write_dataset(tmp_path / "my_robot", [f"{joint}.pos" for joint in PANDA.joints])
+    said = advise(*documented("docs/choosing.md", "er-il advise my_robot")[1:])
+    report = json.loads(Path("outputs/advice.json").read_text())
     assert list(report["demos"]) == ["my_robot"]
     fitness = {each["joints"][0]: each for each in report["demos"]["my_robot"]}
     assert fitness["panda_joint1"]["configurations"] == 50
@@ -56,15 +58,19 @@ def test_a_dataset_is_advised_for_its_demonstrations(advise, tmp_path):
     assert fitness["panda_joint4"]["risk"] > 0.9
     assert "of the steps of my_robot" in said
     assert "redundancy lies among the joints that twist" in said
+    assert Path("outputs/advice.png").read_bytes()[:4] == b"\x89PNG"
+    run("er-il", *documented("docs/choosing.md", "er-il encode my_robot"))
+    run("er-il", *documented("docs/choosing.md", "er-il verify my_robot_erj"))
+    verified = json.loads(Path("outputs/my_robot_erj/report.json").read_text())
+    assert verified["arms"]["panda"]["joint_error"]["p100"] < 1e-3
 
 
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
         (["six.urdf", "--ee-frame", "tool"], "chain6 has 6 joints and so no redundancy"),
-        (["six.urdf"], "give --ee-frame too"),
         (["six.urdf", "--ee-frame", "hand"], "has no end-effector frame 'hand'"),
-        (["absent.urdf", "--ee-frame", "tool"], "There is no file absent.urdf. Presets are panda"),
+        (["absent.urdf", "--ee-frame", "tool"], "There is no file absent.urdf. Presets are "),
         (["nothing_here"], "nothing_here is not a LeRobot v3 dataset"),
         (["panda", "--arm", "xarm7"], "--arm and --arms are for datasets"),
     ],
@@ -78,17 +84,15 @@ def test_mistakes_are_one_line(advise, capsys, tmp_path, arguments, complaint):
 
 
 @pytest.mark.slow
-def test_the_joints_of_a_urdf_by_file_are_advised_with_figures(advise, tmp_path):
-    write_chain(tmp_path / "eight.urdf", 8)
-    joints = [f"j{i}" for i in range(2, 9)]
-    said = advise("eight.urdf", "--ee-frame", "tool", "--urdf-joints", *joints, "--json", "a.json", "--plot", "a.png")
+def test_the_joints_of_a_urdf_by_file_are_advised(advise, tmp_path):
+    write_chain(tmp_path / "my_arm.urdf", 7)
+    said = advise(*documented("docs/choosing.md", "er-il advise my_arm.urdf")[1:], "--json", "a.json")
     report = json.loads(Path("a.json").read_text())
-    assert report["joints"] == joints
+    assert report["joints"] == [f"j{i}" for i in range(1, 8)]
     assert report["demos"] == {}
     risks = {each["joints"][0]: each["risk"] for each in report["workspace"]}
     assert report["recommended"] == [min(risks, key=lambda joint: risks[joint])]
     assert f"Command {report['recommended'][0]}: {min(risks.values()):.1%} of the workspace" in said
-    assert Path("a.png").read_bytes()[:4] == b"\x89PNG"
 
 
 def test_a_dataset_that_does_not_know_its_arm_must_be_told(advise, capsys, tmp_path):

@@ -1,11 +1,13 @@
 """The studies of invalid actions and of ERJ's joints: what they measure, say and write."""
 
 import json
+import shutil
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from documented import documented
 
 from er_il import Arm, Status
 from er_il.cli import main
@@ -153,26 +155,26 @@ def test_the_studies_run_on_recorded_demonstrations(tmp_path, monkeypatch, capsy
         for cell in cells(50, 3, 9)
     ]
     training.write_text(json.dumps({"cells": rows}))
-    run(
-        monkeypatch,
-        "study",
-        "joints",
-        "reach_cup",
-        "--episodes",
-        1,
-        "--training",
-        training,
-        "--out",
-        tmp_path / "joints",
-    )
+    monkeypatch.chdir(tmp_path)
+    study_joints = documented("docs/choosing.md", "er-il study joints")
+    run(monkeypatch, *study_joints, "--episodes", 1, "--training", training, "--out", "joints")
     report = json.loads((tmp_path / "joints/report.json").read_text())
     assert report["recommended"] == ["panda_joint1"]
     assert len(report["workspace"]) == len(report["demos"]["reach_cup"]) == len(choices(PANDA))
     assert report["training"][0]["top_choice_is_best"]
-    assert report["meta"]["git"] and report["meta"]["versions"]["placo"]
+    assert report["meta"]["versions"]["placo"]
     assert "redundancy lies among the joints that twist" in capsys.readouterr().out.replace("\n", " ")
-    dataset = tmp_path / "joints/demos/reach_cup/joint"
-    run(monkeypatch, "study", "validity", dataset, "--samples", 2, "--out", tmp_path / "validity")
+    # The demonstrations are there already: the other studies find them where they would record them.
+    for study in ("validity", "deltas"):
+        shutil.copytree("joints/demos", f"{study}/demos")
+    study_validity = documented("docs/choosing.md", "er-il study validity")
+    run(monkeypatch, *study_validity, "--episodes", 1, "--samples", 1, "--out", "validity")
+    study_deltas = documented("docs/choosing.md", "er-il study deltas")
+    run(monkeypatch, *study_deltas, "--episodes", 1, "--out", "deltas")
+    drifts = {each["space"]: each for each in json.loads(Path("deltas/report.json").read_text())["drifts"]}
+    assert max(drifts[space]["joints"] for space in ("joint", "erj", "era")) < 1e-3 < drifts["task"]["joints"]
+    assert max(each["position"] for each in drifts.values()) < 1e-4
+    assert not any(each["invalid"] for each in drifts.values())
     report = json.loads((tmp_path / "validity/report.json").read_text())
     assert report["meta"]["demos"] == {"reach_cup": 1}
     for picture in ("joints/joints.png", "validity/validity.png"):

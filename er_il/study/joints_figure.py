@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 Report = Mapping[str, Any]
 
 TWIST, BEND, MIXED = "#0072B2", "#E69F00", "#999999"  # Okabe and Ito's palette: told apart by every eye
-SHADES = (1.0, 0.6, 0.35, 0.2)  # of the bars of one choice, a shade a set
+DARK, LIGHT = 1.0, 0.25  # from the first to the last set
 PANEL, HEIGHT = 4.6, 3.0  # [inch]
 
 
@@ -34,6 +35,9 @@ def plot(report: Report, path: Path) -> None:
         axis.set_xlabel("commanded joint")
         axis.spines[["top", "right"]].set_visible(False)
         axis.grid(axis="y", color="#e5e5e5", zorder=0)
+    kinds = [Patch(color=colour, label=label) for colour, label in ((TWIST, "twisting joint"), (BEND, "bending joint"))]
+    shades = [Patch(color=MIXED, alpha=a, linewidth=0, label=name) for a, name in zip(_shades(sets), sets, strict=True)]
+    figure.legend(handles=[*kinds, *shades], loc="outside lower center", ncols=8, fontsize=8, frameon=False)
     best = " + ".join(report["recommended"])
     figure.suptitle(
         f"{report['arm']}: which joint should ERJ command?   Advice: {best}", x=0.01, ha="left", fontsize=11
@@ -45,9 +49,6 @@ def plot(report: Report, path: Path) -> None:
 def _self_motion(axis: Axes, report: Report, sets: Mapping[str, Any]) -> None:
     _bars(axis, report, {name: [each["self_motion"] for each in of_set] for name, of_set in sets.items()})
     axis.set_title("Self-motion turns it at (share of its speed)", loc="left", fontsize=9)
-    for colour, label in ((TWIST, "twisting joint"), (BEND, "bending joint")):
-        axis.bar(0, 0, color=colour, label=label)
-    axis.legend(fontsize=7, frameon=False)
 
 
 def _singular_values(axis: Axes, report: Report, sets: Mapping[str, Any]) -> None:
@@ -66,9 +67,6 @@ def _risk(axis: Axes, report: Report, sets: Mapping[str, Any]) -> None:
     _bars(axis, report, {name: [100 * each["risk"] for each in of_set] for name, of_set in sets.items()})
     axis.set_ylim(0, 100)
     axis.set_title("Near a singularity, or joints lost [%]", loc="left", fontsize=9)
-    for shade, name in zip(_shades(sets), sets, strict=True):
-        axis.bar(0, 0, color=TWIST, alpha=shade, label=name)
-    axis.legend(fontsize=7, frameon=False)
 
 
 def _round_trips(axis: Axes, report: Report, sets: Mapping[str, Any]) -> None:
@@ -116,7 +114,7 @@ def _bars(
 
 
 def _shades(sets: Mapping[str, Any]) -> list[float]:
-    return [SHADES[min(i, len(SHADES) - 1)] for i in range(len(sets))]
+    return np.linspace(DARK, LIGHT, len(sets)).tolist()
 
 
 def _colours(report: Report) -> list[str]:

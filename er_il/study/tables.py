@@ -42,17 +42,14 @@ def validity_table(report: Report) -> str:
 
 def joints_table(report: Report) -> str:
     """Every choice of joints, the best first; then what follows, and how training bears it out."""
-    names = list(report["demos"])
     headings = ["Commanded", "Self-motion", "Near singular", "Round trips back"]
-    headings += [f"{name}: lost or near singular" for name in names] + [f"{name}: flips" for name in names]
+    headings += [f"`{name}`: at risk (flips)" for name in report["demos"]]
     workspace, demos = _by_joints(report["workspace"]), [_by_joints(of_set) for of_set in report["demos"].values()]
     rows = []
     for name in sorted(workspace, key=lambda each: risks(report)[each]):
         each = workspace[name]
         row = [f"`{name}`", f"{each['self_motion']:.2f}", f"{each['near_singular']:.0%}", f"{1 - each['missed']:.1%}"]
-        row += [f"{of_set[name]['risk']:.0%}" for of_set in demos] + [
-            f"{of_set[name]['flips']:.1f}" for of_set in demos
-        ]
+        row += [f"{of_set[name]['risk']:.0%} ({of_set[name]['flips']:.1f})" for of_set in demos]
         rows.append(row)
     trained = [
         f"Training on {each['task']} {'bears this out' if each['top_choice_is_best'] else 'picks another joint'}: "
