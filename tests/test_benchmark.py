@@ -21,6 +21,7 @@ from er_il.benchmark.grid import Entry, Grid, GridError
 from er_il.benchmark.page import write_pages
 from er_il.benchmark.plan import Plan
 from er_il.benchmark.report import cell_report, write_results
+from er_il.benchmark.strip import strips
 from er_il.benchmark.table import compact_table
 from er_il.cli.benchmark import benchmark
 from er_il.errors import ErIlError, UnknownNameError
@@ -228,8 +229,10 @@ def one_core() -> Iterator[None]:
     os.sched_setaffinity(0, before)
 
 
-def written(folder: Path, pattern: str) -> dict[Path, int]:
-    return {path: path.stat().st_mtime_ns for path in folder.rglob(pattern)}
+def written(folder: Path) -> dict[Path, int]:
+    """Demonstrations, policies and rollouts, and when they were written."""
+    found = (path for pattern in ("*.parquet", "*.safetensors", "1000-*.json") for path in folder.rglob(pattern))
+    return {path: path.stat().st_mtime_ns for path in found}
 
 
 @pytest.mark.slow
@@ -255,7 +258,7 @@ def test_a_grid_from_end_to_end(
     assert [each["decoder"] for each in first["meta"]["missing"]] == ["task-nearest"]
 
     in_the_way.unlink()
-    before = written(out, "*.safetensors") | written(out, "1000-*.json") | written(out, "*.parquet")
+    before = written(out)
     grown = Plan(grid(sceptics=["task-grasp"]), out)
     grown.claim()
     executor = InOrder()
@@ -267,7 +270,7 @@ def test_a_grid_from_end_to_end(
         ["roll", "out", "task-nearest"],
         ["roll", "out", "task-grasp"],
     ]
-    assert before.items() <= (written(out, "*.safetensors") | written(out, "1000-*.json") | before).items()
+    assert before.items() <= written(out).items()
     report = write_results(grown, results)
     rows = list(csv.DictReader(gzip.decompress((results / "episodes.csv.gz").read_bytes()).decode().splitlines()))
     assert [(row["decoder"], row["training_seed"], row["seed"]) for row in rows] == [
@@ -283,9 +286,15 @@ def test_a_grid_from_end_to_end(
     costs = report["meta"]["costs"]
     assert (costs["trainings"], costs["rollouts"]) == (2, 6) and costs["training_cpu_s"] > costs["rollout_cpu_s"] > 0
 
+    drawing = Schedule(strips(Plan(grid(), out)).values())
+    drawing.run(InOrder())
+    assert not drawing.failed
+
     table = (results / "episodes.csv.gz").read_bytes()
     run("er-il", *documented("docs/table.md", "er-il benchmark"))  # all is there: it is only reported again
     assert "2/2 cells" in capsys.readouterr().out
+    strip = results / "strip_reach_cup.png"
+    assert imread(strip).std() > 0.05 and strip.stat().st_size < 400_000
     assert len(table) > len((results / "episodes.csv.gz").read_bytes())
     write_results(grown, results)
     assert (results / "episodes.csv.gz").read_bytes() == table

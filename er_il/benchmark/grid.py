@@ -11,11 +11,8 @@ import yaml
 from er_il.arm import Arm
 from er_il.data.recipe import Recipe
 from er_il.errors import ErIlError, UnknownNameError
-from er_il.policy.jobs import space_of
-from er_il.policy.postures import SCEPTICS
+from er_il.policy.postures import SCEPTICS, space_of
 from er_il.tasks import task_id
-
-REFERENCE = "joint"  # the decoder that the others are compared with, rollout by rollout
 
 
 class GridError(ErIlError):

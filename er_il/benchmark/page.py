@@ -5,10 +5,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from er_il.benchmark import paper
+from er_il.benchmark import REFERENCE, RESULTS, paper
 from er_il.benchmark.figure import write_bars, write_curves
-from er_il.benchmark.grid import REFERENCE
-from er_il.benchmark.report import EPISODES, RESULTS
+from er_il.benchmark.report import EPISODES
 from er_il.benchmark.table import compact_table, difference, full_table
 
 TABLE, PAGE = "table.md", "README.md"

@@ -18,7 +18,8 @@ from er_il.data.record import Record
 from er_il.data.recording import generate
 from er_il.errors import ErIlError
 from er_il.policy.evaluation import Cell
-from er_il.policy.jobs import RollOut, Train, roll_outs, space_of, steps_of
+from er_il.policy.jobs import RollOut, Train, roll_outs, steps_of
+from er_il.policy.postures import space_of
 from er_il.policy.results import load_cell, write_whole
 from er_il.policy.training import default_config
 

@@ -8,14 +8,15 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from er_il.benchmark.grid import REFERENCE, Entry
+from er_il.benchmark import REFERENCE, RESULTS
+from er_il.benchmark.grid import Entry
 from er_il.benchmark.plan import Plan
 from er_il.policy.evaluation import FIRST_SEED, Cell
 from er_il.policy.results import load_notes, write_whole
 from er_il.policy.statistics import exact_interval, paired_difference
 from er_il.provenance import provenance
 
-RESULTS, EPISODES = "results.json", "episodes.csv.gz"
+EPISODES = "episodes.csv.gz"
 
 BySeed = Mapping[int, Cell]  # the rollouts of an entry by training seed
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from er_il.benchmark.grid import REFERENCE
+from er_il.benchmark import REFERENCE
 
 Report = Mapping[str, Any]  # of results.json
 Cell = Mapping[str, Any]

@@ -23,42 +23,28 @@ def benchmark(
     import sys
 
     from rich.console import Console
-    from rich.live import Live
 
-    from er_il.benchmark.account import Account
-    from er_il.benchmark.cluster import RayExecutor
     from er_il.benchmark.grid import Grid
-    from er_il.benchmark.page import PAGE, write_pages
+
+    asked = Grid.from_file(grid)  # seconds of imports follow: mistakes are told before
+    from er_il.benchmark.cluster import RayExecutor
+    from er_il.benchmark.page import PAGE
     from er_il.benchmark.plan import Plan
-    from er_il.benchmark.report import write_results
-    from er_il.benchmark.strip import copy_strips, strips
-    from er_il.benchmark.view import View
+    from er_il.benchmark.run import run
     from er_il.cli.table import results_table
-    from er_il.schedule import Schedule
     from er_il.workers import LocalExecutor, cores
 
-    plan = Plan(Grid.from_file(grid), (out or Path("outputs/benchmark") / grid.stem).resolve())
+    plan = Plan(asked, (out or Path("outputs/benchmark") / grid.stem).resolve())
     plan.claim()
-    console = Console()
-    schedule = Schedule(plan.jobs)
+    folder, console = results or Path("results") / grid.stem, Console()
     with RayExecutor(ray_address) if ray_address else LocalExecutor(cores()) as executor:
-        view = View(Account(plan, schedule), schedule, executor, console)
-        with Live(view, console=console, refresh_per_second=2):
-            schedule.run(executor, view.update)
-        folder = results or Path("results") / grid.stem
-        report = write_results(plan, folder)
-        console.print("\nThe results are written; pictures follow.", highlight=False)
-        pictures = strips(plan)
-        drawing = Schedule(pictures.values())
-        drawing.run(executor)
-    copy_strips(pictures, folder)
-    write_pages(folder)
-    console.print(results_table(report["cells"]))
+        outcome = run(plan, executor, console, folder)
+    console.print(results_table(outcome.report["cells"]))
     console.print(f"{folder / PAGE}", highlight=False, soft_wrap=True)
-    for message in drawing.failed.values():
+    for message in outcome.undrawn:
         console.print(f"No strip: {message}", highlight=False)
-    for message in schedule.failed.values():
+    for message in outcome.failures:
         console.print(f"Failed: {message}", style="red", highlight=False)
-    if schedule.failed:
-        console.print(f"{len(report['meta']['missing'])} cells are incomplete. The same command tries again.")
+    if outcome.failures:
+        console.print(f"{len(outcome.report['meta']['missing'])} cells are incomplete. The same command tries again.")
         sys.exit(1)

@@ -17,27 +17,16 @@ from er_il.data.schema import action_spec
 from er_il.errors import ErIlError
 from er_il.policy.actor import POLICY_ROWS
 from er_il.policy.contract import dataset_info
-from er_il.policy.decoders import decoder
 from er_il.policy.elbow import ElbowReference
 from er_il.policy.evaluation import FIRST_SEED, evaluate
-from er_il.policy.postures import SCEPTICS
+from er_il.policy.postures import POSTURE_DECODER, SCEPTICS
 from er_il.policy.results import save_cell, write_whole
 from er_il.policy.training import Training, default_config, default_steps, train_episodes
 from er_il.provenance import git_sha
 from er_il.schedule import Job
 from er_il.spaces import from_spec
 
-POSTURE_DECODER = "task-posture"  # what a sceptic's decoder is, but for the posture
 _LOGGED_STEP = re.compile(r"step:([\d.]+)(K?)")  # as lerobot-train logs it
-
-
-def space_of(decoder_name: str) -> str:
-    """Name of the action space that a decoder, or a sceptic's, reads.
-
-    Raises:
-        UnknownNameError: no decoder has that name.
-    """
-    return decoder(POSTURE_DECODER if decoder_name in SCEPTICS else decoder_name).space
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,8 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from er_il.policy.decoders import decoder
+
 Array = NDArray[np.float64]
 
 CLOSED = 0.5  # opening below which the gripper counts as closed
@@ -29,6 +31,18 @@ def grasp_posture(demos: Sequence[Array]) -> Array:
 
 
 SCEPTICS: Mapping[str, Callable[[Sequence[Array]], Array]] = {"task-mean": mean_posture, "task-grasp": grasp_posture}
+
+
+POSTURE_DECODER = "task-posture"  # what a sceptic's decoder is, but for the posture
+
+
+def space_of(decoder_name: str) -> str:
+    """Name of the action space that a decoder, or a sceptic's, reads.
+
+    Raises:
+        UnknownNameError: no decoder has that name.
+    """
+    return decoder(POSTURE_DECODER if decoder_name in SCEPTICS else decoder_name).space
 
 
 def _last_closing(opening: Array) -> int:
