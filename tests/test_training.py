@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 import torch
-from lerobot.scripts import lerobot_eval, lerobot_train
+from lerobot.scripts import lerobot_edit_dataset, lerobot_eval, lerobot_train
 from rich.progress import Progress
 
 from er_il import cli
@@ -114,6 +114,18 @@ def test_from_demonstrations_to_a_rollout_with_the_stock_commands(
 
     with pytest.raises(PolicyError, match="space 'erj' not 'joint'"):
         run(monkeypatch, lerobot_eval.main, *rollout, "--env.action_space=joint", f"--output_dir={tmp_path / 'no'}")
+
+
+def test_a_dataset_that_lerobot_edited_trains_on_all_that_is_left(
+    datasets: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    edit = ["--repo_id=er_il/reach", f"--root={datasets / 'erj'}", "--new_repo_id=er_il/less"]
+    edit += [f"--new_root={tmp_path / 'less'}", "--operation.type=delete_episodes", "--operation.episode_indices=[2]"]
+    run(monkeypatch, lerobot_edit_dataset.main, *edit)
+    assert not (tmp_path / "less/meta/recipe.json").exists()  # LeRobot leaves it behind; nothing here needs it
+    command = training(datasets, tmp_path / "out", dataset=tmp_path / "less").command
+    assert "--dataset.episodes=[0,1]" in command
+    assert '--policy.tags=["er_il:erj/panda/panda_hand_tcp/quat/panda_joint1"]' in command
 
 
 def test_an_interruption_before_the_first_checkpoint_is_cleared_away(datasets: Path, tmp_path: Path):
