@@ -12,8 +12,8 @@ import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy.typing import ArrayLike, NDArray
 
 from er_il.errors import ArmError, UnknownNameError
-from er_il.panda8 import panda8_urdf
-from er_il.urdf import example_robot_data, kinematic_xml, pinocchio_model
+from er_il.presets import PRESETS
+from er_il.urdf import kinematic_xml, only_tip, pinocchio_model
 
 Vector = NDArray[np.float64]
 
@@ -62,7 +62,7 @@ class Arm:
         cls,
         urdf: str | Path,
         *,
-        ee_frame: str,
+        ee_frame: str | None = None,
         joints: Sequence[str] | None = None,
         base_frame: str | None = None,
         redundant: Sequence[str] | None = None,
@@ -76,14 +76,15 @@ class Arm:
 
         Args:
             urdf: Path of the file. Meshes are not read.
-            ee_frame: Link whose pose the action commands.
+            ee_frame: Link whose pose the action commands; if omitted, the one at the end of the only branch.
             joints: Arm joints in the order of the robot's vectors; every movable joint between
                 the base and the end effector if omitted.
             base_frame: Link in which poses are expressed; the URDF's root if omitted.
             redundant: The n-6 joints that ERJ commands; the first n-6 if omitted (paper IV-C:
                 the base joint on a 7-DoF arm).
             home: (n,) [rad] comfortable posture; the middle of the range if omitted.
-            angle_frames: Shoulder, elbow and wrist links, needed by ERA only.
+            angle_frames: Shoulder, elbow and wrist links, needed by ERA only; if omitted, the links that the second,
+                the fourth and the sixth of seven joints move, where such an arm bends.
             name: Name of the arm; the URDF's robot name if omitted.
 
         Raises:
@@ -94,18 +95,19 @@ class Arm:
         model = pinocchio_model(xml, path.name)
         links = [frame.name for frame in model.frames if frame.type == pin.FrameType.BODY]
         base = base_frame if base_frame is not None else links[0]
-        for role, frame in [("base frame", base), ("end-effector frame", ee_frame)]:
+        ee = ee_frame if ee_frame is not None else only_tip(xml, path.name)
+        for role, frame in [("base frame", base), ("end-effector frame", ee)]:
             if frame not in links:
                 raise ArmError(f"{path.name} has no {role} {frame!r}. Its links: {', '.join(links)}.")
-        chain = _chain(model, base, ee_frame)
+        chain = _chain(model, base, ee)
         if not chain:
-            raise ArmError(f"No movable joint lies between {base!r} and {ee_frame!r} in {path.name}.")
+            raise ArmError(f"No movable joint lies between {base!r} and {ee!r} in {path.name}.")
         chosen = tuple(joints) if joints is not None else chain
         if len(set(chosen)) != len(chosen):
             raise ArmError(f"A joint is named twice in {', '.join(chosen)}.")
         if strangers := [joint for joint in chosen if joint not in chain]:
             raise ArmError(
-                f"{', '.join(strangers)}: not between {base!r} and {ee_frame!r} in {path.name}. "
+                f"{', '.join(strangers)}: not between {base!r} and {ee!r} in {path.name}. "
                 f"Movable joints there: {', '.join(chain)}."
             )
         index = [model.joints[model.getJointId(joint)].idx_q for joint in chosen]
@@ -119,13 +121,13 @@ class Arm:
             urdf=path.resolve(),
             joints=chosen,
             base_frame=base,
-            ee_frame=ee_frame,
+            ee_frame=ee,
             lower=_frozen(lower),
             upper=_frozen(upper),
             velocity=_frozen(velocity),
             redundant=tuple(redundant) if redundant is not None else chosen[:spare],
             home=_frozen((lower + upper) / 2 if home is None else home),
-            angle_frames=angle_frames,
+            angle_frames=angle_frames or _angle_frames(model, [joint for joint in chain if joint in chosen]),
         )
         arm._check(links)
         return arm
@@ -213,6 +215,19 @@ def _robot_name(xml: str) -> str:
     return ET.fromstring(xml).get("name", "arm")
 
 
+def _angle_frames(model: pin.Model, joints: Sequence[str]) -> ArmAngleFrames | None:
+    """The links at which an arm with seven joints bends; None for other arms, which ERA does not describe."""
+    if len(joints) != POSE_DOF + 1:
+        return None
+    bends = [model.getJointId(joints[i]) for i in (1, 3, 5)]
+    return ArmAngleFrames(*(_first_link(model, joint) for joint in bends))
+
+
+def _first_link(model: pin.Model, joint: int) -> str:
+    """The link that a joint moves; what is fixed to that link comes behind it."""
+    return next(frame.name for frame in model.frames if frame.parentJoint == joint and frame.type == pin.FrameType.BODY)
+
+
 def _chain(model: pin.Model, base: str, ee: str) -> tuple[str, ...]:
     """Movable joints from base to end effector, base first."""
     above_base = set(model.supports[model.frames[model.getFrameId(base)].parentJoint])
@@ -224,44 +239,12 @@ def _chain(model: pin.Model, base: str, ee: str) -> tuple[str, ...]:
 def _preset(name: str) -> Arm:
     if name not in PRESETS:
         raise UnknownNameError("arm", name, sorted(PRESETS))
-    return PRESETS[name]()
-
-
-PANDA_HOME = (0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4)
-
-
-def _panda() -> Arm:
+    preset = PRESETS[name]
     return Arm.from_urdf(
-        example_robot_data("panda_description/urdf/panda.urdf"),
-        name="panda",
-        base_frame="panda_link0",
-        ee_frame="panda_hand_tcp",
-        joints=[f"panda_joint{i}" for i in range(1, 8)],
-        home=PANDA_HOME,
-        angle_frames=ArmAngleFrames(shoulder="panda_link2", elbow="panda_link4", wrist="panda_link6"),
+        preset.urdf(),
+        name=name,
+        base_frame=preset.base_frame,
+        ee_frame=preset.ee_frame,
+        joints=preset.joints,
+        home=preset.home,
     )
-
-
-def _panda8() -> Arm:
-    return Arm.from_urdf(
-        panda8_urdf(),
-        name="panda8",
-        base_frame="panda_link0",
-        ee_frame="panda_hand_tcp",
-        joints=["panda_base_joint2", *(f"panda_joint{i}" for i in range(1, 8))],
-        home=(0.0, *PANDA_HOME),
-    )
-
-
-def _xarm7() -> Arm:
-    return Arm.from_urdf(
-        example_robot_data("xarm_description/urdf/xarm7.urdf"),
-        name="xarm7",
-        base_frame="link_base",
-        ee_frame="link_eef",
-        home=[0.0, -0.3, 0.0, 1.2, 0.0, 1.5, 0.0],
-        angle_frames=ArmAngleFrames(shoulder="link2", elbow="link4", wrist="link6"),
-    )
-
-
-PRESETS = {"panda": _panda, "panda8": _panda8, "xarm7": _xarm7}

@@ -13,6 +13,12 @@ from er_il.spaces.pose import PoseSpace
 EXACT = 1e-3  # [rad] a decode that misses a joint by more has not returned the configuration
 SINGULAR = 2e-2  # a smallest singular value (m and rad mixed) below this explains a miss
 
+# Causes of a miss, the first that applies: a limit stands between; another solution meets the action and is nearer the
+# seed, so that no decoder could tell; solutions all but meet there; the status says that the search gave up.
+LIMIT, AMBIGUOUS, ILL_CONDITIONED, REPORTED = "limit", "ambiguous", "ill-conditioned", "reported"
+UNEXPLAINED = "unexplained"
+CAUSES = (LIMIT, AMBIGUOUS, ILL_CONDITIONED, REPORTED, UNEXPLAINED)
+
 
 @dataclass(frozen=True)
 class RoundTrip:
@@ -31,9 +37,17 @@ class RoundTrip:
         return float(np.abs(self.decoded.q - self.q).max()) <= EXACT
 
     @property
-    def explained(self) -> bool:
-        """Whether a configuration that did not come back says so, or lies at a limit or singularity."""
-        return self.decoded.status is not Status.OK or self.at_limit or self.conditioning < SINGULAR
+    def cause(self) -> str:
+        """Why the configuration did not come back, one of ``CAUSES``; "" if it did."""
+        if self.exact:
+            return ""
+        if self.at_limit or self.decoded.status is Status.LIMIT:
+            return LIMIT
+        if self.ambiguous:
+            return AMBIGUOUS
+        if self.conditioning < SINGULAR:
+            return ILL_CONDITIONED
+        return UNEXPLAINED if self.decoded.status is Status.OK else REPORTED
 
     @property
     def ambiguous(self) -> bool:

@@ -106,6 +106,20 @@ def kinematic_xml(path: Path, movable: Sequence[str] | None = None) -> str:
     return ET.tostring(root, encoding="unicode")
 
 
+def only_tip(xml: str, name: str) -> str:
+    """Find the link at the end of a URDF's text that has one branch only.
+
+    Raises:
+        ArmError: it has several.
+    """
+    robot = ET.fromstring(xml)
+    parents = {parent.get("link") for parent in robot.iterfind("joint/parent")}
+    tips = [link for element in robot.findall("link") if (link := element.get("name", "")) not in parents]
+    if len(tips) != 1:
+        raise ArmError(f"{name} ends in several links, so name the end-effector frame, such as {', '.join(tips)}.")
+    return tips[0]
+
+
 def pinocchio_model(xml: str, name: str) -> pin.Model:
     """Build the model of a URDF's text.
 

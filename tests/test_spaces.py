@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from er_il import ActionSpace, Arm, ArmAngleFrames, Status, from_spec, make_action_space
 from er_il.errors import ArmError, ErIlError, ShapeError, SpecError, UnknownNameError
-from er_il.round_trip import EXACT, SINGULAR, RoundTrip, round_trips
+from er_il.round_trip import EXACT, SINGULAR, UNEXPLAINED, RoundTrip, round_trips
 from er_il.spaces import name_of
 from er_il.spaces.task import POSTURE_PULL
 
@@ -18,7 +18,7 @@ def assert_returns_joints(space: ActionSpace, trips: list[RoundTrip], share: flo
     exact = [trip for trip in trips if trip.exact]
     assert len(exact) / len(trips) >= share
     assert all(trip.decoded.status is Status.OK for trip in exact)
-    assert all(trip.explained for trip in trips if not trip.exact)
+    assert all(trip.cause != UNEXPLAINED for trip in trips)
     for trip in trips:
         if trip.decoded.status is Status.OK:
             assert max(space.kinematics.pose_error(space.fk(trip.q), trip.decoded.q)) < 1e-3
@@ -38,13 +38,6 @@ def test_joint_space_returns_the_joints_always():
 def test_er_spaces_return_the_joints(kind, seed_error, share, rotation):
     space = make_action_space(kind, PANDA, rotation=rotation)
     assert_returns_joints(space, round_trips(space, 500, seed_error=seed_error), share)
-
-
-@pytest.mark.parametrize(("name", "kind"), [("panda8", "erj"), ("xarm7", "erj"), ("xarm7", "era")])
-def test_er_spaces_return_the_joints_of_other_presets(name, kind):
-    space = make_action_space(kind, Arm.preset(name))
-    assert_returns_joints(space, round_trips(space, 300, rng_seed=3), 0.97)
-    assert_returns_joints(space, round_trips(space, 300, seed_error=0.03, rng_seed=4), 0.98)
 
 
 @pytest.mark.parametrize("kind", ["erj", "era"])

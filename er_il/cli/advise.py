@@ -70,8 +70,8 @@ def _arms(source: str, robot: ArmOptions, episodes: int) -> "dict[str, tuple[Arm
     """Each arm by its label, and its demonstrations."""
     from dataclasses import replace
 
-    from er_il.arm import PRESETS
     from er_il.errors import DatasetError
+    from er_il.presets import PRESETS
 
     if source in PRESETS or (Path(source).is_file() and Path(source).suffix in (".urdf", ".xml")):
         if robot.arm or robot.arms:

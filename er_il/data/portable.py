@@ -5,7 +5,8 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
-from er_il.arm import PRESETS, Arm, ArmAngleFrames
+from er_il.arm import Arm, ArmAngleFrames
+from er_il.presets import PRESETS
 from er_il.urdf import generated_urdf
 
 _DYNAMICS = ("inertial", "transmission", "gazebo", "material")

@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from er_il.arm import PRESETS, Arm
+from er_il.arm import Arm
 from er_il.data.motors import UNITS, Motors
 from er_il.kinematics import kinematics_of
+from er_il.presets import PRESETS
 
 Array = NDArray[np.float64]
 
@@ -101,7 +102,7 @@ def _symptom(sample: Evidence, q: Array, beyond: float, off: float, still: bool)
 def _verdict(texts: Sequence[str]) -> str:
     if not texts:
         return "It looks like another arm, or offsets between motors and URDF are missing."
-    others = f" It could also be: {'; '.join(texts[1:3])}." if texts[1:] else ""
+    others = f" It could also be: {'; '.join(texts[1:4])}." if texts[1:] else ""
     return f"It looks like {texts[0]}.{others}"
 
 

@@ -7,11 +7,12 @@ from typing import Any
 
 import yaml
 
-from er_il.arm import PRESETS, Arm, ArmAngleFrames
+from er_il.arm import Arm, ArmAngleFrames
 from er_il.data.layout import Layout, Part
 from er_il.data.motors import Motors
 from er_il.data.schema import ACTION, STATE, Feature, dimension_names
 from er_il.errors import ArmError, DatasetError, UnknownNameError
+from er_il.presets import PRESETS
 from er_il.spaces import make_action_space
 
 SUFFIX = ".pos"  # LeRobot's name for the position of a motor
