@@ -1,6 +1,5 @@
 """The leading property, sampled: decode(encode(q), seed near q) gives q back, or shows why not."""
 
-import time
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,7 +28,6 @@ class RoundTrip:
     decoded: Decoded
     conditioning: float  # at q, see Kinematics.conditioning; infinite in joint space
     at_limit: bool  # whether a decoded joint is
-    latency: float  # [s] of the decoding
 
     @property
     def exact(self) -> bool:
@@ -67,9 +65,7 @@ def round_trip(space: ActionSpace, q: Vector, seed_error: float, rng: np.random.
     arm = space.arm
     seed = np.clip(q + rng.uniform(-seed_error, seed_error, arm.dof), arm.lower, arm.upper)
     action = space.encode(q)
-    started = time.perf_counter()
     decoded = space.decode(action, seed)
-    latency = time.perf_counter() - started
     at_limit = np.any((decoded.q - arm.lower < LIMIT_MARGIN) | (arm.upper - decoded.q < LIMIT_MARGIN))
     conditioning = space.conditioning(q) if isinstance(space, PoseSpace) else np.inf
-    return RoundTrip(q, seed, decoded, conditioning, bool(at_limit), latency)
+    return RoundTrip(q, seed, decoded, conditioning, bool(at_limit))
