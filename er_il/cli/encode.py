@@ -29,7 +29,7 @@ def encode(
         out: Folder of the new dataset.
         robot: The arm of a dataset that does not know it.
         redundant: Joints of the URDF that erj commands; the first ones if omitted.
-        angle_frames: Shoulder, elbow and wrist link, which era needs.
+        angle_frames: Shoulder, elbow and wrist link, for era; those at which seven joints bend if omitted.
         rotation: quat or rot6d.
         keep: Keep the actions as they were in a column source.action, which no policy reads.
     """
