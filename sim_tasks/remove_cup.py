@@ -17,7 +17,7 @@ class RemoveCup(CabinetCup):
     pace = 0.5  # else the grasp is over in half a second, too few frames to learn it from
     way = (
         ((-0.04, 0.0, 0.012), 0.1),  # no lower: the wrist would touch the floor of the compartment
-        ((0.012, 0.0, 0.0), 0.1),  # deep between the fingers: on the long way it slips by a centimetre
+        ((0.003, 0.0, 0.0), 0.1),  # the stem in the middle of the finger pads
     )
     way_back = (
         ((-0.03, 0.0, 0.025), 0.1),  # lifted
