@@ -14,6 +14,7 @@ from er_il.benchmark import RESULTS
 from er_il.benchmark.table import compact_table
 from er_il.showcase.circle import drift_table
 from er_il.showcase.report import REPORT, success_table
+from er_il.study.arms_table import round_trips_table
 from er_il.study.tables import deltas_table, joints_table, validity_table
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -26,6 +27,7 @@ TABLES: dict[str, Callable[[Mapping[str, Any]], str]] = {
     "pooled": validity_table,
     "workspace": joints_table,
     "drifts": deltas_table,
+    "round_trips": round_trips_table,
     "cells": lambda report: success_table(report["cells"]),
 }
 

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import draccus
 import pytest
+from chains import write_chain
 from documented import PAGES, ROOT, Block, blocks, entry_point, run, train_in_process
 from foreign import write_bimanual, write_one_arm, write_openarm
 
@@ -48,6 +49,7 @@ def prepare_real_arm(folder: Path) -> None:
 
 # What a reader of the page has already.
 PREPARED: dict[str, Callable[[Path], object]] = {
+    "docs/arms.md": lambda folder: write_chain(folder / "my_arm.urdf", 7),
     "docs/real_arm.md": prepare_real_arm,
     "docs/reencode.md": lambda folder: write_bimanual(folder / "my_robot"),
 }

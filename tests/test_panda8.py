@@ -1,10 +1,12 @@
 """The 8-DoF Panda in the pipeline: worlds, demonstrations, encodings, policies."""
 
+import json
 from pathlib import Path
 
 import gymnasium
 import numpy as np
 import pytest
+from documented import documented, run, train_in_process
 from lerobot.policies.act.configuration_act import ACTConfig
 
 from er_il import Arm, make_action_space
@@ -82,3 +84,15 @@ def test_a_rollout_takes_the_policys_arm(tmp_path: Path, decoder: str) -> None:
     config = environment_of(tmp_path, "lift_cup", decoder)
     assert config.arm == "panda8"
     assert config.features["agent_pos"].shape == (16,)
+
+
+@pytest.mark.slow
+def test_the_pages_commands_make_a_policy_of_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    train_in_process(monkeypatch, "--batch_size=2", "--policy.dim_model=32", "--policy.dim_feedforward=32")
+    run("er-il", *documented("docs/arms.md", "er-il generate"), "--episodes=2")
+    run("er-il", *documented("docs/arms.md", "er-il train"), "--steps=2")
+    run("er-il", *documented("docs/arms.md", "er-il eval"), "--episodes=1")
+    assert {path.name for path in (tmp_path / "datasets/lift_cup_panda8").iterdir()} == {"joint", "task", "erj"}
+    (cell,) = json.loads((tmp_path / "outputs/eval/lift_cup/erj/report.json").read_text())["cells"]
+    assert cell["episodes"] == 1
