@@ -1,15 +1,13 @@
 """The grid of a benchmark: what is compared, on what, how often; all fixed before the first rollout."""
 
 import dataclasses
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from er_il.arm import Arm
 from er_il.data.recipe import Recipe
+from er_il.declaration import keys_of, read_yaml
 from er_il.errors import ErIlError, UnknownNameError
 from er_il.policy.postures import SCEPTICS, space_of
 from er_il.tasks import task_id
@@ -105,12 +103,7 @@ class Grid:
         Raises:
             GridError: the file is unreadable or no grid.
         """
-        try:
-            values = yaml.safe_load(path.read_text())
-        except FileNotFoundError as error:
-            raise GridError(f"There is no grid {path}.") from error
-        except (yaml.YAMLError, UnicodeDecodeError) as error:
-            raise GridError(f"{path} is not valid YAML.") from error
+        values = read_yaml(path, "grid", GridError)
         try:
             return cls.from_dict(values)
         except ErIlError as error:
@@ -123,16 +116,7 @@ class Grid:
         Raises:
             GridError: keys are missing, unknown, or of the wrong type.
         """
-        if not isinstance(values, Mapping):
-            raise GridError("A grid is a mapping of keys to values.")
-        fields = {each.name: each for each in dataclasses.fields(cls)}
-        if unknown := [str(key) for key in values if key not in fields]:
-            raise GridError(f"A grid has no {', '.join(unknown)}. Valid: {', '.join(fields)}.")
-        if missing := [
-            name for name, each in fields.items() if each.default is dataclasses.MISSING and name not in values
-        ]:
-            raise GridError(f"The grid lacks {', '.join(missing)}.")
-        return cls(**{key: _value(key, value) for key, value in values.items()})
+        return cls(**{key: _value(key, value) for key, value in keys_of(cls, values, "grid", GridError).items()})
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON or YAML."""

@@ -7,8 +7,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-import yaml
-
+from er_il.declaration import keys_of, read_yaml
 from er_il.errors import DatasetError, UnknownNameError
 from er_il.resources import data_dir
 
@@ -82,12 +81,7 @@ class Recipe:
         Raises:
             DatasetError: the file is unreadable or no recipe.
         """
-        try:
-            values = yaml.safe_load(path.read_text())
-        except FileNotFoundError as error:
-            raise DatasetError(f"There is no recipe {path}.") from error
-        except (yaml.YAMLError, UnicodeDecodeError) as error:
-            raise DatasetError(f"{path} is not valid YAML.") from error
+        values = read_yaml(path, "recipe", DatasetError)
         try:
             return cls.from_dict(values)
         except DatasetError as error:
@@ -100,14 +94,7 @@ class Recipe:
         Raises:
             DatasetError: keys are missing, unknown, or of the wrong type.
         """
-        if not isinstance(values, Mapping):
-            raise DatasetError("A recipe is a mapping of keys to values.")
-        fields = {each.name: each for each in dataclasses.fields(cls)}
-        if unknown := [str(key) for key in values if key not in fields]:
-            raise DatasetError(f"A recipe has no {', '.join(unknown)}. Valid: {', '.join(fields)}.")
-        required = [name for name, each in fields.items() if _required(each)]
-        if missing := [name for name in required if name not in values]:
-            raise DatasetError(f"The recipe lacks {', '.join(missing)}.")
+        values = keys_of(cls, values, "recipe", DatasetError)
         arguments = dict(values)
         arguments["cameras"] = _names(values.get("cameras", ()))
         for name, kind in [("task", str), ("arm", str), ("randomisation", Mapping)]:
@@ -157,10 +144,6 @@ class Recipe:
 def recipe_names() -> tuple[str, ...]:
     """Tasks that have a shipped recipe, in alphabetical order."""
     return tuple(sorted(path.stem for path in data_dir("datasets").glob(f"*{SUFFIX}")))
-
-
-def _required(each: "dataclasses.Field[Any]") -> bool:
-    return each.default is dataclasses.MISSING and each.default_factory is dataclasses.MISSING
 
 
 def _names(values: object) -> tuple[str, ...]:
