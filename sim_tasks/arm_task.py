@@ -137,6 +137,11 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
         return tuple(f"{name}.{part}" for name in self.objects for part in POSE_NAMES)
 
     @property
+    def _nominal_start(self) -> Vector:
+        """Joint angles (n,) [rad] around which episodes start."""
+        return np.append(self.arm.home[: self.arm.dof - len(self.start)], self.start)
+
+    @property
     def joint_positions(self) -> Vector:
         """The follower's true joint angles (n,) [rad]."""
         return self._data.qpos[self._robot.joint_qpos].copy()
@@ -165,8 +170,8 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Start an episode. ``options={"state": {name: (x, y, yaw)}}`` places objects by hand."""
         super().reset(seed=seed)
-        start = np.array(self.start) + self.np_random.uniform(-self._start_range, self._start_range, len(self.start))
-        start = np.append(self.arm.home[: self.arm.dof - len(start)], start)
+        start = self._nominal_start
+        start[-len(self.start) :] += self.np_random.uniform(-self._start_range, self._start_range, len(self.start))
         placement = self._draw(self.np_random)
         chosen = (options or {}).get("state", {})
         for name, where in chosen.items():

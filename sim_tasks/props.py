@@ -156,6 +156,10 @@ class PushButton:
     stiffness: float = 200.0  # [N/m] of the spring under it
     mass: float = 0.05  # [kg] of the cap
 
+    def raised(self, lift: float) -> "PushButton":
+        """The button on a pedestal that is ``lift`` [m] higher."""
+        return replace(self, height=self.height + lift)
+
     @property
     def rest(self) -> float:
         """Height of the cap's underside while nobody presses."""

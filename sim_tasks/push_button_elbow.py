@@ -39,9 +39,11 @@ class PushButtonElbow(ArmTask):
     button = PushButton()
     objects = (BUTTON,)
     obstacles = (PEDESTAL,)
+    arms = ("panda", "panda8")
     centre = (0.18, -0.25)
     hand = (0.50, 0.0, 0.60)  # x, y, z [m] of the hand while the elbow presses a button at the centre
     start = (0.25, -0.8, -0.25, -2.1, -0.2, 2.1, 0.9)  # the elbow up
+    lean = 0.1  # [rad] of the joints below the base joint, on an arm that has any
 
     def __init__(
         self,
@@ -74,7 +76,7 @@ class PushButtonElbow(ArmTask):
         return -float(self._data.joint(BUTTON).qpos[0])
 
     def _build(self, spec: mujoco.MjSpec) -> None:
-        self.button.add(spec, BUTTON, PEDESTAL, "red", base="yellow")
+        self.button.raised(self.lift).add(spec, BUTTON, PEDESTAL, "red", base="yellow")
 
     def _draw(self, rng: np.random.Generator) -> Placement:
         x, y = np.array(self.centre) + (rng.random(2) - 0.5) * self._button_range
@@ -97,10 +99,11 @@ class PushButtonElbow(ArmTask):
     def _script(self, rng: np.random.Generator) -> tuple[Sequence[Stretch], float]:
         x, y = self.object_pose(BUTTON)[:2]
         place = np.array(self.hand) + FOLLOW * np.array([x - self.centre[0], y - self.centre[1], 0.0])
+        place[2] += self.lift
         turn = rng.uniform(-self._via_range, self._via_range, 3)
-        swing = Keyframe(self._hand_pose(place + ASIDE + turn), RAISED)
+        swing = Keyframe(self._hand_pose(place + ASIDE + turn), RAISED, lean=self.lean)
         pressing = self._hand_pose(place)
-        press = Keyframe(pressing, self._pressing_elbow(pressing), straight=True)
+        press = Keyframe(pressing, self._pressing_elbow(pressing), straight=True, lean=self.lean)
         # The elbow is to touch the button, and nothing else is near.
         path = plan_stretch(self.arm, self.joint_positions, [swing, press], is_free=lambda _: True)
         return [Stretch(path, gripper=0.0, hold=HOLD)], rng.uniform(*self._speed_range)
@@ -120,9 +123,11 @@ class PushButtonElbow(ArmTask):
         """
         data = mujoco.MjData(self._model)
         data.mocap_pos[:], data.mocap_quat[:] = self._data.mocap_pos, self._data.mocap_quat
-        q = np.array(self.start)
+        q = self._nominal_start
+        *below, elbow = self.arm.redundant
+        leaning = dict.fromkeys(below, self.lean)
         for angle in np.arange(RAISED, LOW, TURN).tolist():
-            ik = kinematics_of(self.arm).solve(T_base_ee, q, fixed={self.arm.redundant[-1]: angle})
+            ik = kinematics_of(self.arm).solve(T_base_ee, q, fixed=leaning | {elbow: angle})
             if ik.status is not Status.OK:
                 break
             q = ik.q
