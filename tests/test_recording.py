@@ -15,8 +15,8 @@ from er_il.data.demos import Demo, make_world, record_demo
 from er_il.data.recipe import Recipe
 from er_il.data.record import Record
 from er_il.data.recording import generate
-from er_il.data.schema import ACTION, DEMO_SEED, ENVIRONMENT_STATE, LEADER_JOINTS, action_spec
-from er_il.data.stillness import LEAST_RANGE
+from er_il.data.scales import LEAST_DEVIATION, MARGIN
+from er_il.data.schema import ACTION, DEMO_SEED, ENVIRONMENT_STATE, LEADER_JOINTS, STATE, action_spec
 from er_il.errors import DatasetError, UnknownNameError
 from er_il.spaces import from_spec
 
@@ -68,15 +68,18 @@ def test_the_actions_are_the_encoded_leader(generated):
 
 
 @pytest.mark.parametrize("kind", ["joint", "erj"])
-def test_what_stands_still_is_not_scaled_up(generated, kind):
+def test_scales_are_those_of_what_differs_between_episodes(generated, kind):
     dataset = _load(generated.paths[kind])
     poses = np.stack(dataset.hf_dataset[ENVIRONMENT_STATE])
+    starts = poses[[episode["dataset_from_index"] for episode in dataset.meta.episodes]]
     low, high = (np.array(dataset.meta.stats[ENVIRONMENT_STATE][key]) for key in ("min", "max"))
-    moved = np.ptp(poses, axis=0) >= LEAST_RANGE
-    assert 0 < np.sum(moved) < poses.shape[1]  # lifted, hardly turned
-    np.testing.assert_allclose((low[moved], high[moved]), (poses.min(axis=0)[moved], poses.max(axis=0)[moved]))
-    np.testing.assert_allclose((high - low)[~moved], LEAST_RANGE, rtol=1e-5)
-    assert np.all((low <= poses) & (poses <= high))
+    np.testing.assert_allclose(low, starts.min(axis=0) - MARGIN, rtol=1e-5)
+    np.testing.assert_allclose(high, starts.max(axis=0) + MARGIN, rtol=1e-5)
+    assert np.any(poses > high)  # lifted: farther than it ever stood
+    state = np.stack(dataset.hf_dataset[STATE])
+    deviation = np.maximum(state.std(axis=0), LEAST_DEVIATION)
+    np.testing.assert_allclose(dataset.meta.stats[STATE]["std"], deviation, rtol=1e-3)
+    assert np.any(state.std(axis=0) < LEAST_DEVIATION)
 
 
 def test_a_demo_seed_brings_its_world_back(generated):

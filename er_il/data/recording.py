@@ -24,8 +24,8 @@ from er_il.data.encoding import encode_dataset
 from er_il.data.layout import Layout
 from er_il.data.recipe import Recipe
 from er_il.data.record import Record
+from er_il.data.scales import set_scales
 from er_il.data.schema import ACTION, DEMO_SEED, ENVIRONMENT_STATE, IMAGES, LEADER_JOINTS, STATE, features
-from er_il.data.stillness import widen_ranges
 from er_il.errors import DatasetError
 from er_il.spaces import ActionSpace, check_space, make_action_space
 
@@ -151,7 +151,7 @@ class _Writer:
         info = self._dataset.meta.info
         info.splits = self._recipe.splits
         write_info(info, self._dataset.root)
-        widen_ranges(self._dataset.root)
+        set_scales(self._dataset.root)
         Record(self._recipe, dropped).write(self._dataset.root)
 
 

@@ -1,0 +1,35 @@
+"""Scales by which policies see the world: fit to what differs between episodes, not to what moves most."""
+
+from pathlib import Path
+
+import numpy as np
+from lerobot.datasets import write_stats
+from lerobot.datasets.io_utils import load_stats
+
+from er_il.data.rewriting import episode_slices, read_episode_numbers, read_vectors
+from er_il.data.schema import ENVIRONMENT_STATE, STATE
+
+MARGIN = 0.025  # [m], or of a quaternion's component (2.9 degrees), around where objects start
+LEAST_DEVIATION = 0.02  # [rad], [m], or of a quaternion's component, of the robot's state
+
+
+def set_scales(root: Path) -> None:
+    """Set the statistics by which ``configs/`` normalise what a policy sees.
+
+    Object poses are scaled to a range. It becomes that of the episodes' starts, and a margin. The range of
+    whole episodes would not do: an object that is carried across the scene has a large one, in which the
+    centimetre by which its place differs from start to start is too little to see; an object that nobody
+    moves trembles by less than a micrometre, and scaled by that, a graze would drown all else.
+
+    The robot's state is scaled by its standard deviation. It becomes at least ``LEAST_DEVIATION``: where the
+    hand keeps its orientation, millimetres of tracking error would become many deviations.
+
+    Args:
+        root: Folder of the dataset; its episodes' own statistics stay what they were.
+    """
+    stats = load_stats(root) or {}
+    poses = read_vectors(root, ENVIRONMENT_STATE)
+    starts = poses[[episode.start for episode in episode_slices(read_episode_numbers(root))]].astype(np.float64)
+    stats[ENVIRONMENT_STATE] |= {"min": starts.min(axis=0) - MARGIN, "max": starts.max(axis=0) + MARGIN}
+    stats[STATE] |= {"std": np.maximum(stats[STATE]["std"], LEAST_DEVIATION)}
+    write_stats(stats, root)
