@@ -225,7 +225,7 @@ def test_the_robot_speaks_the_units_and_observes_the_pose_that_it_is_asked_for()
 
 
 def test_mistakes():
-    with pytest.raises(UnknownNameError, match="lift_cup.*reach_cup"):
+    with pytest.raises(UnknownNameError, match=r"lift_cup.*reach_cup"):
         SimFollower(SimFollowerConfig(task="reach_cap"))
     with pytest.raises(UnknownNameError, match="rad, deg"):
         ScriptedLeader(ScriptedLeaderConfig(units="turns"))
