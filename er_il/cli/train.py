@@ -15,7 +15,7 @@ def train(
     config: Path | None = None,
     out: Path | None = None,
 ) -> None:
-    """Train a policy on a dataset's training episodes; prints the stock command it runs.
+    """Train a policy on a dataset's training episodes; prints the stock command, and runs it with its data in memory.
 
     Interrupted, the same command resumes from the last checkpoint.
 
