@@ -9,6 +9,7 @@ import numpy as np
 from sim_tasks.arm_task import ArmTask, Placement
 from sim_tasks.collision import Collisions
 from sim_tasks.contact import touching
+from sim_tasks.hand import hand_pose
 from sim_tasks.motion import Keyframe, Stretch, plan_stretch
 from sim_tasks.props import Goblet
 from sim_tasks.scene import scene_spec
@@ -97,15 +98,6 @@ class CupTask(ArmTask):
     def _times_out(self) -> str:
         return "missed_grasp" if self.gripper_opening < CLOSED and not self._held() else "timeout"
 
-    def _hand(self, position: np.ndarray) -> np.ndarray:
-        """T_base_ee (4, 4) of a hand that points forward and down, the fingers level."""
-        approach = np.array([np.cos(PITCH), 0.0, -np.sin(PITCH)])
-        level = np.array([0.0, -1.0, 0.0])  # the flange up, as the Panda carries its camera
-        T = np.eye(4)
-        T[:3, :3] = np.column_stack([np.cross(level, approach), level, approach])
-        T[:3, 3] = position
-        return T
-
     @cached_property
     def _collisions(self) -> Collisions:
         spec = scene_spec(self.arm)
@@ -117,11 +109,13 @@ class CupTask(ArmTask):
         grasp = np.array([x, y, self.standing + GRASP_HEIGHT])
         turn = rng.uniform(-self._via_range, self._via_range, 3)
         there = [
-            Keyframe(self._hand(grasp + offset + (turn if i == 0 else 0.0)), elbow, straight=i > 0, lean=self.lean)
+            Keyframe(
+                hand_pose(grasp + offset + (turn if i == 0 else 0.0), PITCH), elbow, straight=i > 0, lean=self.lean
+            )
             for i, (offset, elbow) in enumerate(self.way)
         ]
         back = [
-            Keyframe(self._hand(grasp + offset), elbow, straight=True, lean=self.lean)
+            Keyframe(hand_pose(grasp + offset, PITCH), elbow, straight=True, lean=self.lean)
             for offset, elbow in self.way_back
         ]
         is_free = self._collisions.is_free

@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 from sim_tasks.arm_task import ArmTask, Placement
 from sim_tasks.collision import Collisions
 from sim_tasks.contact import touching
+from sim_tasks.hand import hand_pose
 from sim_tasks.household import BEAR, BOOKS, CACTUS, HEAD_HEIGHT, LAMP, VASE, Sideboard, Thing
 from sim_tasks.motion import Keyframe, Stretch, plan_stretch
 from sim_tasks.props import Wall
@@ -135,16 +136,6 @@ class RetrieveBear(ArmTask):
     def _times_out(self) -> str:
         return "missed_grasp" if self.gripper_opening < CLOSED else "timeout"
 
-    def _hand(self, position: np.ndarray, yaw: float) -> np.ndarray:
-        """T_base_ee (4, 4) of a hand that points down and forward, turned by ``yaw`` [rad], the fingers level."""
-        cos, sin = np.cos(yaw), np.sin(yaw)
-        approach = np.array([np.cos(PITCH) * cos, np.cos(PITCH) * sin, -np.sin(PITCH)])
-        level = np.array([sin, -cos, 0.0])  # the flange up, as the Panda carries its camera
-        T = np.eye(4)
-        T[:3, :3] = np.column_stack([np.cross(level, approach), level, approach])
-        T[:3, 3] = position
-        return T
-
     @cached_property
     def _collisions(self) -> Collisions:
         spec = scene_spec(self.arm)
@@ -158,11 +149,11 @@ class RetrieveBear(ArmTask):
         turn = rng.uniform(-self._via_range, self._via_range, 3)
         offset, elbow = self.above
         there = [
-            Keyframe(self._hand(self.before + turn, 0.0), self.out),
-            Keyframe(self._hand(grasp + along.apply(offset), yaw), elbow, straight=True),
-            Keyframe(self._hand(grasp, yaw), self.up, straight=True),
+            Keyframe(hand_pose(self.before + turn, PITCH), self.out),
+            Keyframe(hand_pose(grasp + along.apply(offset), PITCH, yaw), elbow, straight=True),
+            Keyframe(hand_pose(grasp, PITCH, yaw), self.up, straight=True),
         ]
-        back = [Keyframe(self._hand(grasp + along.apply(self.lifted), yaw), self.up, straight=True)]
+        back = [Keyframe(hand_pose(grasp + along.apply(self.lifted), PITCH, yaw), self.up, straight=True)]
         self._collisions.place({name: self._data.joint(name).qpos for name in self.objects})
         is_free = self._collisions.is_free
         reach = plan_stretch(self.arm, self.joint_positions, there, is_free)
