@@ -42,6 +42,17 @@ def test_a_row_holds_what_was_seen_before_the_action(world):
     np.testing.assert_array_equal(demo.state[1], observation["agent_pos"])
 
 
+def test_a_disturbed_follower_leaves_the_way_that_the_recorded_action_leads_back_to(world):
+    seed = next(RECIPE.demo_seeds())
+    calm, pushed = record_demo(world, seed), record_demo(world, seed, disturbance=0.006)
+    assert isinstance(calm, Demo)
+    assert isinstance(pushed, Demo)
+    np.testing.assert_array_equal(pushed.joints, calm.joints)
+    away = np.abs(pushed.state[:, :7] - calm.state[:, :7])
+    assert 0.002 < away.mean() < 0.01
+    assert away[-1].max() < 0.004  # calm again at the grasp
+
+
 def test_saved_demos_come_back(tmp_path):
     rng = np.random.default_rng(0)
     joints, state, poses = (rng.normal(size=(5, k)).astype(np.float32) for k in (8, 15, 7))

@@ -152,7 +152,7 @@ def test_cameras_are_recorded_once_and_shared(tmp_path):
     dataset = _load(made.paths["erj"])
     start = dataset.meta.episodes[1]["dataset_from_index"]
     world = make_world(recipe)
-    demo = record_demo(world, int(dataset[start][DEMO_SEED]))
+    demo = record_demo(world, int(dataset[start][DEMO_SEED]), RECIPE.disturbance)
     world.close()
     assert isinstance(demo, Demo)
     for step in (0, 40, len(demo) - 1):  # video frames belong to their rows, in the second episode too

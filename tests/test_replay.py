@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from er_il.policy.decoders import decoder
 from er_il.policy.decoding_env import make_decoding_env
 from er_il.tasks import task_id
 
-RECIPE = Recipe.load("reach_cup").resized(2)
+RECIPE = replace(Recipe.load("reach_cup"), disturbance=0.0).resized(2)
 
 
 @pytest.fixture(scope="module")

@@ -11,6 +11,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
+from er_il.data.disturbance import disturbances
 from er_il.data.recipe import Recipe
 from er_il.errors import DatasetError, PlanError
 from er_il.tasks import task_id
@@ -21,6 +22,7 @@ Floats = NDArray[np.float32]
 HOPELESS = 10  # give up once this many more demos have failed than succeeded
 
 _IMAGES = "images/"
+_PUSHES = 1  # tells the stream of random pushes from the world's and the leader's, which start from the seed itself
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +71,8 @@ def make_world(recipe: Recipe) -> gymnasium.Env[Any, Any]:
         raise DatasetError(f"The task {recipe.task} does not take this recipe: {error}") from error
 
 
-def record_demo(world: gymnasium.Env[Any, Any], seed: int) -> Demo | str:
-    """Play one demonstration. Returns it, or why it is dropped.
+def record_demo(world: gymnasium.Env[Any, Any], seed: int, disturbance: float = 0.0) -> Demo | str:
+    """Play one demonstration, with a disturbance [rad] of the follower. Returns it, or why it is dropped.
 
     It goes on to the leader's end, beyond the moment of success: from a demonstration that breaks off
     there, a policy learns to stop just short of it.
@@ -79,10 +81,13 @@ def record_demo(world: gymnasium.Env[Any, Any], seed: int) -> Demo | str:
     rows: list[tuple[Any, Floats]] = []
     unwrapped: Any = world.unwrapped
     try:
-        for target in unwrapped.leader(seed):
-            action = np.asarray(target, dtype=np.float32)
-            rows.append((observation, action))
-            observation, _, terminated, truncated, info = world.step(action)
+        script = np.array(list(unwrapped.leader(seed)))
+        rng = np.random.default_rng([seed, _PUSHES])
+        pushes = disturbances(script, disturbance, 1 / world.metadata["render_fps"], rng)
+        for target, push in zip(script, pushes, strict=True):
+            rows.append((observation, target.astype(np.float32)))
+            pushed = np.append(target[:-1] + push, target[-1]).astype(np.float32)
+            observation, _, terminated, truncated, info = world.step(pushed)
             if truncated or (terminated and not info["is_success"]):
                 break
     except PlanError:
@@ -159,7 +164,7 @@ class _Recorder:
         if path.exists():
             return ""
         self.world = self.world or make_world(self.recipe)
-        outcome = record_demo(self.world, seed)
+        outcome = record_demo(self.world, seed, self.recipe.disturbance)
         if isinstance(outcome, str):
             return outcome
         outcome.save(path)

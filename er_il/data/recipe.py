@@ -16,6 +16,8 @@ from er_il.resources import data_dir
 DEMO_SEED_BASE = 1_000_000
 DEMOS_PER_SEED = 10_000
 
+LARGEST_DISTURBANCE = 0.1  # [rad]: more is no slip but another way
+
 TRAIN, VALIDATION = "train", "validation"
 SUFFIX = ".yaml"
 
@@ -35,6 +37,7 @@ class Recipe:
     arm: str = "panda"
     cameras: tuple[str, ...] = ()  # recorded as videos; none: state only
     image_size: int = 96  # [px] width and height of every camera
+    disturbance: float = 0.0  # [rad] by which the follower is pushed off the leader's way (er_il.data.disturbance)
     randomisation: Mapping[str, Any] = field(default_factory=dict)  # keyword arguments of the environment
 
     def __post_init__(self) -> None:
@@ -47,6 +50,8 @@ class Recipe:
             )
         if self.seed < 0:
             raise DatasetError(f"The seed is {self.seed}; it must not be negative.")
+        if not 0 <= self.disturbance < LARGEST_DISTURBANCE:
+            raise DatasetError(f"The disturbance is {self.disturbance}; it must be in [0, {LARGEST_DISTURBANCE}) rad.")
         if self.episodes > DEMOS_PER_SEED:
             raise DatasetError(f"A seed is good for {DEMOS_PER_SEED} demos, fewer than {self.episodes}.")
         if self.image_size < 16 or self.image_size % 2:
@@ -103,6 +108,10 @@ class Recipe:
         for name in ("episodes", "validation", "seed", "image_size"):
             if name in values and (not isinstance(values[name], int) or isinstance(values[name], bool)):
                 raise DatasetError(f"{name} is {values[name]!r}, not a whole number.")
+        if "disturbance" in values and (
+            not isinstance(values["disturbance"], int | float) or values["disturbance"] is True
+        ):
+            raise DatasetError(f"disturbance is {values['disturbance']!r}, not a number.")
         return cls(**arguments)
 
     def to_dict(self) -> dict[str, Any]:

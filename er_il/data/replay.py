@@ -36,7 +36,7 @@ class Replayed:
     seed: int
     success: bool
     failure: str  # "" after success
-    deviation: float  # [rad] largest distance of a joint from where it was in the demo at that step
+    deviation: float  # [rad] largest distance of a joint from where it was in the demo at that step, pushed or not
     joint_step: float  # [rad] largest joint change that a decoded action asked for
     statuses: Counter[str]  # of decoding, one a step
 
