@@ -19,7 +19,7 @@ from sim_tasks.arm_task import ArmTask
 from sim_tasks.lift_cup import LiftCup
 
 PANDA8 = Arm.preset("panda8")
-TASKS = ("LiftCup", "ReachCup", "PushButtonElbow", "RemoveCup")
+TASKS = ("LiftCup", "ReachCup", "PushButtonElbow")
 
 
 def make(task: str) -> tuple[gymnasium.Env, ArmTask]:

@@ -13,7 +13,7 @@ from er_il.kinematics import kinematics_of
 from sim_tasks.arm_task import ArmTask
 
 IDS = [f"sim_tasks/{task.__name__}-v0" for task in sim_tasks.TASKS]
-DEMOS = 15  # a task; the benchmark of 100 is a command (README)
+DEMOS = 6  # a task; the benchmark of 100 is a command (README)
 
 
 def make(task_id: str, **kwargs: object) -> tuple[gymnasium.Env, ArmTask]:
