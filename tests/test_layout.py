@@ -154,7 +154,7 @@ def test_files_of_arms_that_cannot_be_read(tmp_path, text, message):
 @pytest.mark.parametrize(
     ("wiring", "error", "message"),
     [
-        (Wiring("ur5"), UnknownNameError, "Unknown arm 'ur5'. Valid: gen3, panda, panda8, xarm7, the path of a URDF file."),
+        (Wiring("ur5"), UnknownNameError, "Unknown arm 'ur5'. Valid: gen3, panda, panda8, xarm7, the path of a URDF"),
         (Wiring("panda"), DatasetError, "Which dimensions are the joints of panda"),
         (Wiring("panda", joints=("elbow",)), UnknownNameError, "Unknown dimension of the action 'elbow'. Valid: "),
         (Wiring("panda", joints=NAMES[:3]), DatasetError, "panda has 7 joints .* but 3 dimensions are given"),
