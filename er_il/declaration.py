@@ -1,7 +1,7 @@
 """Plain values from a YAML file, checked against the dataclass that they declare."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,20 +10,25 @@ import yaml
 from er_il.errors import ErIlError
 
 
-def read_yaml(path: Path, what: str, error: type[ErIlError]) -> object:
-    """Read a YAML (or JSON) file.
+def read_declaration[T](path: Path, what: str, error: type[ErIlError], build: Callable[[object], T]) -> T:
+    """Read what a YAML (or JSON) file declares.
 
     Args:
         path: The file.
         what: What it should be, such as "recipe".
-        error: What to raise if it is missing or unreadable.
+        error: What to raise if it is missing, unreadable, or refused by ``build``.
+        build: Makes the declared object of plain values.
     """
     try:
-        return yaml.safe_load(path.read_text())
+        values = yaml.safe_load(path.read_text())
     except FileNotFoundError as cause:
         raise error(f"There is no {what} {path}.") from cause
     except (yaml.YAMLError, UnicodeDecodeError) as cause:
         raise error(f"{path} is not valid YAML.") from cause
+    try:
+        return build(values)
+    except ErIlError as cause:
+        raise error(f"{path}: {cause}") from cause
 
 
 def keys_of(declared: type[Any], values: object, what: str, error: type[ErIlError]) -> Mapping[str, Any]:

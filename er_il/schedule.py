@@ -44,6 +44,22 @@ class Job(Protocol):
         ...
 
 
+class FileResult:
+    """What jobs share whose result is one file."""
+
+    path: Path  # of the result
+
+    @property
+    def log(self) -> Path:
+        """What went wrong, if something did."""
+        return self.path.with_suffix(".log")
+
+    @property
+    def done(self) -> bool:
+        """Whether the result is there."""
+        return self.path.exists()
+
+
 class Executor(Protocol):
     """Where functions run."""
 

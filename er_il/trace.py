@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_il.errors import DatasetError, ShapeError
+from er_il.whole_file import write_arrays
 
 Array = NDArray[np.float64]
 
@@ -85,11 +86,7 @@ class Trace:
         text = json.dumps({"version": TRACE_VERSION} | {name: getattr(self, name) for name in _TEXTS}, sort_keys=True)
         arrays = {name: np.asarray(getattr(self, name)) for name in _ARRAYS}
         images = {_IMAGES + camera: frames for camera, frames in self.images.items()}
-        path.parent.mkdir(parents=True, exist_ok=True)
-        partial = path.with_name(path.name + ".partial")
-        with partial.open("wb") as file:
-            np.savez_compressed(file, allow_pickle=False, meta=np.array(text), **arrays, **images)
-        partial.rename(path)
+        write_arrays(path, {"meta": np.array(text)} | arrays | images)
 
     @classmethod
     def load(cls, path: Path) -> "Trace":

@@ -12,10 +12,11 @@ from typing import Any
 import gymnasium
 
 import sim_tasks  # noqa: F401  registers the tasks
+from er_il.schedule import FileResult
 
 
 @dataclass(frozen=True)
-class FileJob:
+class FileJob(FileResult):
     """Writes what it computed from its seed and from the files it needs."""
 
     path: Path
@@ -27,14 +28,6 @@ class FileJob:
     @property
     def name(self) -> str:
         return self.path.stem
-
-    @property
-    def log(self) -> Path:
-        return self.path.with_suffix(".log")
-
-    @property
-    def done(self) -> bool:
-        return self.path.exists()
 
     @property
     def runs(self) -> int:

@@ -3,12 +3,11 @@
 import contextlib
 import functools
 import io
-import logging
 import re
 import shlex
 import shutil
 import textwrap
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from pathlib import Path
 
 import draccus
@@ -19,6 +18,8 @@ from foreign import write_bimanual, write_one_arm, write_openarm
 
 import er_il.cli
 from er_il import Arm
+
+pytestmark = pytest.mark.usefixtures("quiet_logging")
 
 # What is put behind a command, where it would take long or download something; the last of equal options counts.
 SMALLER = {
@@ -53,16 +54,6 @@ PREPARED: dict[str, Callable[[Path], object]] = {
     "docs/real_arm.md": prepare_real_arm,
     "docs/reencode.md": lambda folder: write_bimanual(folder / "my_robot"),
 }
-
-
-@pytest.fixture(autouse=True)
-def quiet_logging() -> Generator[None]:
-    """Undo what the stock commands do to the root logger, which pytest listens on."""
-    root = logging.getLogger()
-    handlers, level = list(root.handlers), root.level
-    yield
-    root.handlers[:] = handlers
-    root.setLevel(level)
 
 
 @pytest.fixture

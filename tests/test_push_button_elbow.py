@@ -1,9 +1,8 @@
 """Push Button Elbow: who may press, where the button stands, and that it springs back."""
 
-from collections.abc import Iterable
-
 import numpy as np
 import pytest
+from playing import play
 
 from er_il.kinematics import Status, kinematics_of
 from er_il.spaces import make_action_space
@@ -15,15 +14,6 @@ STEPS = 25  # control steps from one of the hand's places to the next
 @pytest.fixture(scope="module")
 def world() -> PushButtonElbow:
     return PushButtonElbow()
-
-
-def play(world: PushButtonElbow, actions: Iterable[np.ndarray]) -> str:
-    """Outcome of an episode: ``success``, a failure, or nothing."""
-    for action in actions:
-        _, _, terminated, _, info = world.step(action)
-        if terminated or info["failure"]:
-            return info["failure"] or "success"
-    return ""
 
 
 def hand_through(world: PushButtonElbow, *places: tuple[float, float, float]) -> list[np.ndarray]:

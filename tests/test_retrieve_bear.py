@@ -4,6 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 import pytest
+from playing import play
 
 from er_il.spaces import make_action_space
 from sim_tasks.retrieve_bear import DISPLACED, LIFTED, RetrieveBear
@@ -19,15 +20,6 @@ ASIDE = {
 @pytest.fixture(scope="module")
 def world() -> RetrieveBear:
     return RetrieveBear()
-
-
-def play(world: RetrieveBear, actions: Iterable[np.ndarray]) -> str:
-    """Outcome of an episode: ``success``, a failure, or nothing."""
-    for action in actions:
-        _, _, terminated, _, info = world.step(action)
-        if terminated or info["failure"]:
-            return info["failure"] or "success"
-    return ""
 
 
 def still(world: RetrieveBear, gripper: float = 1.0) -> np.ndarray:

@@ -3,7 +3,6 @@
 import json
 import logging
 import sys
-from collections.abc import Generator
 from pathlib import Path
 
 import gymnasium
@@ -26,6 +25,8 @@ from er_il.policy.lerobot_env import ErIlEnvConfig
 from er_il.robot.hardware import ScriptedLeader, ScriptedLeaderConfig, SimFollower, SimFollowerConfig
 from er_il.tasks import task_id
 
+pytestmark = pytest.mark.usefixtures("quiet_logging")
+
 SEED = 7
 SIZE = 32
 ROBOT = ["--robot.type=er_il_sim", f"--robot.seed={SEED}", f"--robot.image_size={SIZE}"]
@@ -33,16 +34,6 @@ LEADER = ["--teleop.type=er_il_scripted_leader", f"--teleop.seed={SEED}"]
 RATE = 60  # [Hz] the simulated world takes its own time, 20 Hz: here three times as fast as life
 NAMES = [*(f"panda_joint{i}.pos" for i in range(1, 8)), "gripper.pos"]
 TINY = ["dim_model=32", "dim_feedforward=32", "n_heads=2", "n_encoder_layers=1", "use_vae=false"]
-
-
-@pytest.fixture(autouse=True)
-def quiet_logging() -> Generator[None]:
-    """Undo what the stock commands do to the root logger, which pytest listens on."""
-    root = logging.getLogger()
-    handlers, level = list(root.handlers), root.level
-    yield
-    root.handlers[:] = handlers
-    root.setLevel(level)
 
 
 def run(main: object, *arguments: str) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 from er_il.arm import Arm
 from er_il.data.recipe import Recipe
-from er_il.declaration import keys_of, read_yaml
+from er_il.declaration import keys_of, read_declaration
 from er_il.errors import ErIlError, UnknownNameError
 from er_il.policy.postures import SCEPTICS, space_of
 from er_il.tasks import task_id
@@ -103,11 +103,7 @@ class Grid:
         Raises:
             GridError: the file is unreadable or no grid.
         """
-        values = read_yaml(path, "grid", GridError)
-        try:
-            return cls.from_dict(values)
-        except ErIlError as error:
-            raise GridError(f"{path}: {error}") from error
+        return read_declaration(path, "grid", GridError, cls.from_dict)
 
     @classmethod
     def from_dict(cls, values: object) -> "Grid":

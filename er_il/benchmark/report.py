@@ -3,7 +3,6 @@
 import csv
 import gzip
 import io
-import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -12,9 +11,10 @@ from er_il.benchmark import REFERENCE, RESULTS
 from er_il.benchmark.grid import Entry
 from er_il.benchmark.plan import Plan
 from er_il.policy.evaluation import FIRST_SEED, Cell
-from er_il.policy.results import load_notes, write_whole
+from er_il.policy.results import load_notes
 from er_il.policy.statistics import exact_interval, paired_difference
 from er_il.provenance import provenance
+from er_il.whole_file import write_json, write_whole
 
 EPISODES = "episodes.csv.gz"
 
@@ -34,8 +34,7 @@ def write_results(plan: Plan, folder: Path) -> dict[str, Any]:
             cells.append(cell_report(entry, by_seed, references[key]))
             rows += _rows(entry, by_seed)
     report = {"meta": provenance() | _meta(plan, cells), "cells": cells}
-    folder.mkdir(parents=True, exist_ok=True)
-    write_whole(folder / RESULTS, lambda path: path.write_text(json.dumps(report, indent=2) + "\n"))
+    write_json(folder / RESULTS, report)
     write_whole(folder / EPISODES, lambda path: path.write_bytes(_compressed(rows)))
     return report
 

@@ -10,7 +10,7 @@ from er_il.benchmark.grid import Entry
 from er_il.benchmark.plan import Plan
 from er_il.policy.jobs import Train
 from er_il.policy.rollout import SUCCESS, record_rollout
-from er_il.schedule import Job
+from er_il.schedule import FileResult, Job
 from er_il.showcase.pictures import Row, moments, write_strip
 from er_il.showcase.report import LABELS
 from er_il.showcase.showing import telling_seed
@@ -24,7 +24,7 @@ NAME = "strip_{}.png"  # of a task, among the results
 
 
 @dataclass(frozen=True)
-class Strip:
+class Strip(FileResult):
     """Roll one initial state out through each decoder, and show the rollouts below one another."""
 
     decoders: tuple[str, ...]
@@ -41,16 +41,6 @@ class Strip:
     def needs(self) -> tuple[Job, ...]:
         """The trained policies."""
         return tuple(dict.fromkeys(self.policies))
-
-    @property
-    def log(self) -> Path:
-        """What went wrong, if something did."""
-        return self.path.with_suffix(".log")
-
-    @property
-    def done(self) -> bool:
-        """Whether the strip is there."""
-        return self.path.exists()
 
     def run(self) -> None:
         """Roll out and draw.

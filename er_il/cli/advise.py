@@ -46,7 +46,7 @@ def advise(
     from er_il.provenance import provenance
     from er_il.study.joints import study_joints
     from er_il.study.joints_figure import plot as draw
-    from er_il.study.reports import write_report
+    from er_il.whole_file import write_json
     from er_il.workers import cores
 
     console = Console()
@@ -61,7 +61,7 @@ def advise(
         for note in report["notes"]:
             console.print(note, highlight=False)
         if json:
-            write_report({"meta": provenance() | {"source": source}} | report, _named(json, label))
+            write_json(_named(json, label), {"meta": provenance() | {"source": source}} | report)
         if plot:
             draw(report, _named(plot, label))
 

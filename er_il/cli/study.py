@@ -32,7 +32,7 @@ def joints(
     from er_il.study.joints import study_joints
     from er_il.study.joints_figure import plot
     from er_il.study.prediction import predict, read_training
-    from er_il.study.reports import write_report
+    from er_il.whole_file import write_json
     from er_il.workers import cores
 
     cells = read_training(training) if training else []
@@ -47,7 +47,7 @@ def joints(
     if training:
         report["training"] = predict(report, cells)
     meta = provenance() | {"demos": {name: len(paths) for name, paths in of_sets.items()}}
-    write_report({"meta": meta} | report, out / REPORT)
+    write_json(out / REPORT, {"meta": meta} | report)
     plot(report, out / "joints.png")
     for note in report["notes"]:
         console.print(note, highlight=False)
@@ -82,10 +82,10 @@ def validity(
     from er_il.errors import ErIlError
     from er_il.provenance import provenance
     from er_il.study.demos import study_demos
-    from er_il.study.reports import write_report
     from er_il.study.validity import study_validity
     from er_il.study.validity_figure import plot
     from er_il.study.validity_report import report as summarised
+    from er_il.whole_file import write_json
     from er_il.workers import cores
 
     if samples < 1:
@@ -100,7 +100,7 @@ def validity(
         )
     report = summarised(outcomes)
     meta = provenance() | {"arm": arm.name, "demos": {name: len(paths) for name, paths in of_sets.items()}}
-    write_report({"meta": meta | {"samples": samples}} | report, out / REPORT)
+    write_json(out / REPORT, {"meta": meta | {"samples": samples}} | report)
     plot(report, out / "validity.png")
     for finding in report["findings"]:
         console.print(finding, highlight=False)
@@ -126,7 +126,7 @@ def deltas(
     from er_il.provenance import provenance
     from er_il.study.deltas import study_deltas
     from er_il.study.demos import study_demos
-    from er_il.study.reports import write_report
+    from er_il.whole_file import write_json
     from er_il.workers import cores
 
     console = Console()
@@ -134,7 +134,7 @@ def deltas(
         arm, of_sets = study_demos(demos, episodes, out / "demos", progress, cores())
     report = study_deltas(arm, of_sets)
     meta = provenance() | {"arm": arm.name, "demos": {name: len(paths) for name, paths in of_sets.items()}}
-    write_report({"meta": meta} | report, out / REPORT)
+    write_json(out / REPORT, {"meta": meta} | report)
     for each in report["drifts"]:
         console.print(
             f"{each['space']}: {each['steps']} steps, joints off by {each['joints']:.1e} rad at most, "

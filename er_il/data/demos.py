@@ -15,6 +15,7 @@ from er_il.data.disturbance import disturbances
 from er_il.data.recipe import Recipe
 from er_il.errors import DatasetError, PlanError
 from er_il.tasks import task_id
+from er_il.whole_file import write_arrays
 from er_il.workers import worker_pool
 
 Floats = NDArray[np.float32]
@@ -44,10 +45,7 @@ class Demo:
             name: getattr(self, name) for name in ("seed", "joints", "state", "environment_state")
         }
         images: dict[str, Any] = {_IMAGES + camera: frames for camera, frames in self.images.items()}
-        partial = path.with_suffix(".partial")
-        with partial.open("wb") as file:
-            np.savez_compressed(file, allow_pickle=False, **arrays, **images)
-        partial.rename(path)
+        write_arrays(path, arrays | images)
 
     @classmethod
     def load(cls, path: Path) -> "Demo":

@@ -7,7 +7,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from er_il.declaration import keys_of, read_yaml
+from er_il.declaration import keys_of, read_declaration
 from er_il.errors import DatasetError, UnknownNameError
 from er_il.resources import data_dir
 
@@ -86,11 +86,7 @@ class Recipe:
         Raises:
             DatasetError: the file is unreadable or no recipe.
         """
-        values = read_yaml(path, "recipe", DatasetError)
-        try:
-            return cls.from_dict(values)
-        except DatasetError as error:
-            raise DatasetError(f"{path}: {error}") from error
+        return read_declaration(path, "recipe", DatasetError, cls.from_dict)
 
     @classmethod
     def from_dict(cls, values: object) -> "Recipe":

@@ -4,7 +4,6 @@ A policy that imitated its demonstrations perfectly would do what a replay does.
 fails, the encoding has lost something that the task needs.
 """
 
-import json
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -23,6 +22,7 @@ from er_il.policy.outcomes import summarise
 from er_il.rotation import Quaternion
 from er_il.spaces import from_spec, name_of
 from er_il.tasks import task_id
+from er_il.whole_file import write_json
 from er_il.workers import worker_pool
 
 # [s] The last action is held that long at most: a grip found a little later than in the demo is a grip all the same.
@@ -134,10 +134,7 @@ def find_datasets(names: Sequence[str]) -> list[Path]:
 
 def write_report(cells: Sequence[ReplayCell], meta: dict[str, Any], path: Path) -> None:
     """Write the cells as JSON, in the form of every report."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(path.name + ".partial")
-    partial.write_text(json.dumps({"meta": meta, "cells": [cell.report() for cell in cells]}, indent=2))
-    partial.rename(path)
+    write_json(path, {"meta": meta, "cells": [cell.report() for cell in cells]})
 
 
 @dataclass(frozen=True)

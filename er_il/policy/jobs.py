@@ -20,11 +20,12 @@ from er_il.policy.contract import dataset_info
 from er_il.policy.elbow import ElbowReference
 from er_il.policy.evaluation import FIRST_SEED, evaluate
 from er_il.policy.postures import POSTURE_DECODER, SCEPTICS
-from er_il.policy.results import save_cell, write_whole
+from er_il.policy.results import save_cell
 from er_il.policy.training import Training, default_config, default_steps, train_episodes
 from er_il.provenance import git_sha
-from er_il.schedule import Job
+from er_il.schedule import FileResult, Job
 from er_il.spaces import from_spec
+from er_il.whole_file import write_whole
 
 _LOGGED_STEP = re.compile(r"step:([\d.]+)(K?)")  # as lerobot-train logs it
 
@@ -103,7 +104,7 @@ class Train:
 
 
 @dataclass(frozen=True)
-class RollOut:
+class RollOut(FileResult):
     """Roll a trained policy out through a decoder, on some of the initial states."""
 
     trained: Train
@@ -122,16 +123,6 @@ class RollOut:
     def needs(self) -> tuple[Job, ...]:
         """The trained policy."""
         return (self.trained,)
-
-    @property
-    def log(self) -> Path:
-        """What went wrong, if something did."""
-        return self.path.with_suffix(".log")
-
-    @property
-    def done(self) -> bool:
-        """Whether the result is there."""
-        return self.path.exists()
 
     def run(self) -> None:
         """Roll out and write the cell, with what it cost."""

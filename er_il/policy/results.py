@@ -3,24 +3,22 @@
 import csv
 import json
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from er_il.policy.evaluation import Cell, Episode
+from er_il.whole_file import write_json, write_whole
 
 
 def write_cells(cells: Sequence[Cell], meta: dict[str, Any], folder: Path) -> None:
     """Write ``report.json`` and one row an episode in ``episodes.csv``."""
-    folder.mkdir(parents=True, exist_ok=True)
-    report = {"meta": meta, "cells": [cell.report() for cell in cells]}
-    write_whole(folder / "report.json", lambda path: path.write_text(json.dumps(report, indent=2) + "\n"))
+    write_json(folder / "report.json", {"meta": meta, "cells": [cell.report() for cell in cells]})
     write_whole(folder / "episodes.csv", lambda path: _write_csv(cells, path))
 
 
 def save_cell(cell: Cell, path: Path, notes: Mapping[str, Any] | None = None) -> None:
     """Write a cell with all its episodes, for :func:`load_cell`, and notes (JSON) on how it came about."""
-    path.parent.mkdir(parents=True, exist_ok=True)
     data = vars(cell) | {"episodes": [vars(episode) for episode in cell.episodes], "notes": notes or {}}
     write_whole(path, lambda partial: partial.write_text(json.dumps(data)))
 
@@ -58,10 +56,3 @@ def _write_csv(cells: Sequence[Cell], path: Path) -> None:
                         f"{e.joint_step:.6f}",
                     ]
                 )
-
-
-def write_whole(path: Path, write: Callable[[Path], object]) -> None:
-    """Let ``write`` write a file under another name, and give it its own once it is whole."""
-    partial = path.with_name(path.name + ".partial")
-    write(partial)
-    partial.rename(path)

@@ -9,6 +9,7 @@ import av
 from PIL import Image, ImageDraw, ImageFont
 
 from er_il.showcase.pictures import BAD, GOOD, INK
+from er_il.whole_file import write_whole
 
 WIDTH = 440  # [px] of a film
 HEADER, GAP = 30, 6  # [px] above a film for its title, and between films
@@ -35,11 +36,8 @@ def write_animation(panels: Sequence[Panel], path: Path) -> None:
     length = max(len(film) for film in pictures)
     frames = [_frame(panels, pictures, at) for at in range(length)]
     durations = [period] * (length - 1) + [PAUSE]
-    partial = path.with_name(path.name + ".partial")
-    frames[0].save(
-        partial, format="WEBP", save_all=True, append_images=frames[1:], duration=durations, loop=0, quality=QUALITY
-    )
-    partial.rename(path)
+    options = {"save_all": True, "append_images": frames[1:], "duration": durations, "loop": 0, "quality": QUALITY}
+    write_whole(path, lambda partial: frames[0].save(partial, format="WEBP", **options))
 
 
 def _read(film: Path) -> tuple[Iterator[Image.Image], float]:

@@ -7,7 +7,6 @@ where it was. ERJ commands one more joint, so the same action means the same arm
 Everything is kinematics: each solution is the seed of the next, as on an arm that follows exactly.
 """
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +23,7 @@ from er_il.provenance import provenance
 from er_il.spaces import make_action_space
 from er_il.spaces.pose import PoseSpace
 from er_il.urdf import generated_urdf
+from er_il.whole_file import write_json
 
 Array = NDArray[np.float64]
 Solver = Callable[[Array, Vector], Vector]  # T_base_ee (4, 4) and a seed (n,) [rad] to joints (n,) [rad]
@@ -85,11 +85,7 @@ def drive_all(arm: Arm) -> list[Drive]:
 def write_report(arm: Arm, drives: Sequence[Drive], path: Path) -> None:
     """Write what was measured, and how, as JSON."""
     how = {"arm": arm.name, "start": arm.home.tolist(), "radius": RADIUS, "laps": LAPS, "poses_a_lap": POSES}
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(path.name + ".partial")
-    report = {"meta": provenance() | how, "drives": [drive.report() for drive in drives]}
-    partial.write_text(json.dumps(report, indent=2))
-    partial.rename(path)
+    write_json(path, {"meta": provenance() | how, "drives": [drive.report() for drive in drives]})
 
 
 def drift_table(report: Mapping[str, Any]) -> str:

@@ -10,6 +10,7 @@ from lerobot.lerobot_types import RobotAction, RobotObservation
 from lerobot.robots import Robot, RobotConfig
 from lerobot.utils.decorators import check_if_already_connected, check_if_not_connected
 
+from er_il.robot.hardware.calibration import NeedsNoCalibration
 from er_il.robot.hardware.episodes import EpisodeAnnouncements
 from er_il.robot.hardware.joints import POSITION, JointNames
 from er_il.tasks import task_id
@@ -41,7 +42,7 @@ class SimFollowerConfig(RobotConfig):
     pose: bool = False
 
 
-class SimFollower(Robot):
+class SimFollower(NeedsNoCalibration, Robot):
     """A follower arm in its simulated world, which stands still between two actions.
 
     Every action takes one control period (``fps``) of the world's time, however long that lasts: the
@@ -102,16 +103,6 @@ class SimFollower(Robot):
     def connect(self, calibrate: bool = True) -> None:
         self._announcements.listen()
         self._restart(0)
-
-    @property
-    def is_calibrated(self) -> bool:
-        return True
-
-    def calibrate(self) -> None:
-        """Do nothing: a simulated joint needs no calibration."""
-
-    def configure(self) -> None:
-        """Do nothing: the world is configured when it is made."""
 
     @check_if_not_connected
     def get_observation(self) -> RobotObservation:

@@ -11,6 +11,7 @@ from lerobot.teleoperators import Teleoperator, TeleoperatorConfig
 from lerobot.utils.decorators import check_if_already_connected, check_if_not_connected
 
 from er_il.arm import Vector
+from er_il.robot.hardware.calibration import NeedsNoCalibration
 from er_il.robot.hardware.episodes import EpisodeAnnouncements
 from er_il.robot.hardware.joints import JointNames
 from er_il.tasks import task_id
@@ -34,7 +35,7 @@ class ScriptedLeaderConfig(TeleoperatorConfig):
     units: str = "deg"
 
 
-class ScriptedLeader(Teleoperator):
+class ScriptedLeader(NeedsNoCalibration, Teleoperator):
     """An arm that plays the demonstration of the world that its seed names, then holds its last pose.
 
     It has a world of its own to look at, so the follower may be any robot with these joints; a
@@ -78,16 +79,6 @@ class ScriptedLeader(Teleoperator):
     def connect(self, calibrate: bool = True) -> None:
         self._announcements.listen()
         self._plan(0)
-
-    @property
-    def is_calibrated(self) -> bool:
-        return True
-
-    def calibrate(self) -> None:
-        """Do nothing: a simulated joint needs no calibration."""
-
-    def configure(self) -> None:
-        """Do nothing: there is nothing to configure."""
 
     @check_if_not_connected
     def get_action(self) -> RobotAction:

@@ -1,0 +1,31 @@
+"""Files that are whole or absent: written under another name, and given their own at the end."""
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+
+def write_whole(path: Path, write: Callable[[Path], object]) -> None:
+    """Let ``write`` write a file under another name, and give it its own once it is whole."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(path.name + ".partial")
+    write(partial)
+    partial.rename(path)
+
+
+def write_json(path: Path, data: Mapping[str, Any]) -> None:
+    """Write a report, for people to read too."""
+    write_whole(path, lambda partial: partial.write_text(json.dumps(data, indent=2) + "\n"))
+
+
+def write_arrays(path: Path, arrays: Mapping[str, Any]) -> None:
+    """Write arrays as a compressed ``.npz``."""
+
+    def write(partial: Path) -> None:
+        with partial.open("wb") as file:  # given a path, NumPy would change its ending
+            np.savez_compressed(file, allow_pickle=False, **arrays)
+
+    write_whole(path, write)
