@@ -70,6 +70,16 @@ def test_mistakes_in_a_grid_name_the_valid_choices(tmp_path: Path) -> None:
         grid(rollouts=0)
     with pytest.raises(GridError, match="demonstrations holds 33, but the recipe of reach_cup has 32"):
         grid(demonstrations=[4, 33], episodes=None)
+    with pytest.raises(UnknownNameError, match=r"Unknown configuration 'pixels'. Valid: images, images_small"):
+        grid(configuration="pixels", cameras={"reach_cup": ["wrist"]})
+    with pytest.raises(GridError, match="it lacks the cameras of reach_cup"):
+        grid(configuration="images_small")
+    with pytest.raises(GridError, match="it lacks configuration, one of images, images_small"):
+        grid(cameras={"reach_cup": ["wrist"]})
+    with pytest.raises(GridError, match="cameras names lift_cup, which the grid does not have"):
+        grid(cameras={"lift_cup": ["wrist"]})
+    with pytest.raises(GridError, match=r"cameras is \['wrist'\], not a list of cameras for each task"):
+        grid(cameras=["wrist"])
     with pytest.raises(GridError, match="There is no grid"):
         Grid.from_file(tmp_path / "none.yaml")
     (tmp_path / "grid.yaml").write_text(yaml.safe_dump(TINY | {"rollouts": "many"}))
@@ -77,7 +87,7 @@ def test_mistakes_in_a_grid_name_the_valid_choices(tmp_path: Path) -> None:
         Grid.from_file(tmp_path / "grid.yaml")
 
 
-@pytest.mark.parametrize("name", ["table1", "data_efficiency"])
+@pytest.mark.parametrize("name", ["table1", "data_efficiency", "images", "panda8"])
 def test_the_shipped_grids_are_grids(name: str) -> None:
     shipped = Grid.from_file(Path(__file__).parents[1] / "configs" / f"{name}.yaml")
     assert Grid.from_dict(shipped.to_dict()) == shipped
@@ -95,6 +105,20 @@ def test_jobs_differ_wherever_their_results_may(tmp_path: Path) -> None:
     assert trained["task-nearest"] == trained["task-posture"] == trained["task-mean"] != trained["joint"]
     other = Plan(grid(steps=3), tmp_path).jobs
     assert not {job.path for job in other} & {job.path for job in jobs}
+
+
+def test_images_are_recorded_and_learnt_from_where_a_grid_says_so(tmp_path: Path) -> None:
+    seeing = grid(configuration="images_small", cameras={"reach_cup": ["wrist"]})
+    assert Grid.from_dict(seeing.to_dict()) == seeing
+    assert (seeing.recipe("reach_cup").cameras, grid().recipe("reach_cup").cameras) == (("wrist",), ())
+    assert len(Schedule([*Plan(seeing, tmp_path).jobs, *Plan(grid(), tmp_path).jobs]).waiting) == 10  # none is shared
+    Plan(seeing, tmp_path / "mine").claim()
+    with pytest.raises(ErIlError, match="trained by other configurations than today's, of joint, task"):
+        Plan(grid(), tmp_path / "mine").claim()
+
+
+def test_a_grid_without_the_reference_is_reported_without_differences(tmp_path: Path) -> None:
+    assert write_results(Plan(grid(decoders=["erj"]), tmp_path), tmp_path)["cells"] == []
 
 
 def test_a_folder_belongs_to_one_grid(tmp_path: Path) -> None:

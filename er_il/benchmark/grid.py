@@ -1,7 +1,8 @@
 """The grid of a benchmark: what is compared, on what, how often; all fixed before the first rollout."""
 
 import dataclasses
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ from er_il.data.recipe import Recipe
 from er_il.declaration import keys_of, read_declaration
 from er_il.errors import ErIlError, UnknownNameError
 from er_il.policy.postures import SCEPTICS, space_of
+from er_il.resources import data_dir
 from er_il.tasks import task_id
 
 
@@ -46,6 +48,8 @@ class Grid:
     steps: int | None = None  # of training; as many as the space's configuration says if None
     introduction: str = ""  # a paragraph for the page
     arm: str = "panda"
+    configuration: str = ""  # kind of training, such as images_small: configs/act_<space>_images_small.yaml
+    cameras: Mapping[str, tuple[str, ...]] = field(default_factory=dict, hash=False)  # that policies see, by task
 
     def __post_init__(self) -> None:
         for task in self.tasks:
@@ -72,6 +76,7 @@ class Grid:
                 raise GridError(f"{key} is {min(values)}; it must be at least 1.")
         if min(self.training_seeds) < 0:
             raise GridError(f"training_seeds holds {min(self.training_seeds)}; seeds must not be negative.")
+        self._check_images()
         for task in self.tasks:
             recipe = self.recipe(task)
             available = recipe.episodes - recipe.validation
@@ -81,9 +86,20 @@ class Grid:
                     f"but the recipe of {task} has {available} to train on."
                 )
 
+    def _check_images(self) -> None:
+        kinds = sorted(path.stem.removeprefix(_KIND) for path in data_dir("configs").glob(f"{_KIND}*.yaml"))
+        if self.configuration and self.configuration not in kinds:
+            raise UnknownNameError("configuration", self.configuration, kinds)
+        if strangers := sorted(set(self.cameras) - set(self.tasks)):
+            raise GridError(f"cameras names {', '.join(strangers)}, which the grid does not have among its tasks.")
+        blind = [task for task in self.tasks if not self.cameras.get(task)]
+        if (self.configuration or self.cameras) and (blind or not self.configuration):
+            missing = f"the cameras of {', '.join(blind)}" if blind else f"configuration, one of {', '.join(kinds)}"
+            raise GridError(f"To learn from images, a grid needs configuration and cameras; it lacks {missing}.")
+
     def recipe(self, task: str) -> Recipe:
         """What is recorded of a task."""
-        recipe = Recipe.load(task, self.arm)
+        recipe = replace(Recipe.load(task, self.arm), cameras=self.cameras.get(task, ()))
         return recipe if self.episodes is None else recipe.resized(self.episodes)
 
     @property
@@ -116,11 +132,12 @@ class Grid:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON or YAML."""
-        values = dataclasses.asdict(self)
+        values = dataclasses.asdict(self) | {"cameras": {task: list(names) for task, names in self.cameras.items()}}
         return {key: list(value) if isinstance(value, tuple) else value for key, value in values.items()}
 
 
-_TEXTS, _NAMES = ("title", "introduction", "arm"), ("tasks", "decoders", "sceptics")
+_KIND = "act_joint_"  # a training configuration of joint space stands for those of all spaces
+_TEXTS, _NAMES = ("title", "introduction", "arm", "configuration"), ("tasks", "decoders", "sceptics")
 _NUMBERS, _OPTIONAL = ("training_seeds", "demonstrations"), ("episodes", "steps")
 
 
@@ -130,6 +147,10 @@ def _value(key: str, value: Any) -> Any:
         if not isinstance(value, str):
             raise GridError(f"{key} is {value!r}, not a text.")
         return value
+    if key == "cameras":
+        if not isinstance(value, dict) or not all(isinstance(names, list) for names in value.values()):
+            raise GridError(f"{key} is {value!r}, not a list of cameras for each task.")
+        return {task: tuple(map(str, names)) for task, names in value.items()}
     if key in _NAMES or key in _NUMBERS:
         kind, what = (str, "names") if key in _NAMES else (int, "whole numbers")
         if not isinstance(value, list) or not all(isinstance(each, kind) and each is not True for each in value):

@@ -67,8 +67,7 @@ def _differences(report: Report) -> str:
     own = [task for task in grid["tasks"] if task not in paper.SUCCESSES]
     lines = [
         "Simulation: a Panda in MuJoCo, led by a scripted arm; the paper has two real ones, and a person who leads.",
-        "The policies see the true poses of the objects (state-based), where the paper's see camera images; they are "
-        f"small, trained for {' to '.join(map(str, steps))} steps on a CPU.",
+        f"{_sight(grid)} They are small, trained for {' to '.join(map(str, steps))} steps on a CPU.",
         f"{episodes} rollouts a cell instead of {paper.ROLLOUTS}; the diamonds are the paper's figures.",
         "Task space is decoded by each of two rules (`task-nearest`: the solution nearest to the present joints; "
         "`task-posture`: pulled to a comfortable posture), where the paper uses one solver, pick_ik. Its diamond "
@@ -80,6 +79,17 @@ def _differences(report: Report) -> str:
     if own:
         lines.append(f"{', '.join(f'`{task}`' for task in own)}: not in the paper.")
     return "\n".join(f"- {line}" for line in lines)
+
+
+def _sight(grid: Mapping[str, Any]) -> str:
+    """What the policies see."""
+    if not grid["cameras"]:
+        return "The policies see the true poses of the objects (state-based), where the paper's see camera images."
+    each = ", ".join(f"`{task}` {' and '.join(names)}" for task, names in grid["cameras"].items())
+    return (
+        f"The policies see the arm's state and images (`configs/act_<space>_{grid['configuration']}.yaml`; cameras: "
+        f"{each}), smaller ones than the paper's 224 × 224."
+    )
 
 
 def _sceptics(report: Report) -> str:

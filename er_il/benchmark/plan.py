@@ -13,7 +13,6 @@ import yaml
 from rich.progress import Progress
 
 from er_il.benchmark.grid import Entry, Grid
-from er_il.data.recipe import Recipe
 from er_il.data.record import Record
 from er_il.data.recording import generate
 from er_il.errors import ErIlError
@@ -29,11 +28,10 @@ OWNER = "benchmark.json"
 
 @dataclass(frozen=True)
 class Demonstrate:
-    """Record the demonstrations of a task's recipe, once, and encode them in each space."""
+    """Record the demonstrations of a grid's task, once, and encode them in each space."""
 
     task: str
-    arm: str
-    episodes: int
+    grid: Grid
     spaces: tuple[str, ...]
     out: Path  # folder of the datasets, one a space
 
@@ -57,8 +55,7 @@ class Demonstrate:
     def run(self) -> None:
         """Record and encode what is missing."""
         with Progress(disable=True) as progress:
-            recipe = Recipe.load(self.task, self.arm).resized(self.episodes)
-            generate(recipe, self.spaces, self.out, progress, workers=1)
+            generate(self.grid.recipe(self.task), self.spaces, self.out, progress, workers=1)
 
 
 @dataclass(frozen=True)
@@ -84,7 +81,9 @@ class Plan:
                     )
         owner = self.out / OWNER
         names = {space_of(entry.decoder) for entry in self.grid.entries}
-        mine = {name: yaml.safe_load(default_config(name).read_text()) for name in sorted(names)}
+        mine = {
+            name: yaml.safe_load(default_config(name, self.grid.configuration).read_text()) for name in sorted(names)
+        }
         theirs = {}
         if owner.exists():
             found = json.loads(owner.read_text())
@@ -106,16 +105,13 @@ class Plan:
     def _demonstrations(self) -> dict[str, Demonstrate]:
         spaces = tuple(dict.fromkeys(space_of(entry.decoder) for entry in self.grid.entries))
         folder = self.out / "datasets"
-        return {
-            task: Demonstrate(task, self.grid.arm, self.grid.recipe(task).episodes, spaces, folder / task)
-            for task in self.grid.tasks
-        }
+        return {task: Demonstrate(task, self.grid, spaces, folder / task) for task in self.grid.tasks}
 
     def training(self, entry: Entry, seed: int) -> Train:
         """The training of an entry's policy."""
         space = space_of(entry.decoder)
         demonstrate = self._demonstrations[entry.task]
-        steps = steps_of(space, self.grid.steps)
+        steps = steps_of(space, self.grid.steps, self.grid.configuration)
         return Train(
             task=entry.task,
             space=space,
@@ -124,6 +120,7 @@ class Plan:
             steps=steps,
             seed=seed,
             demonstrations=entry.demonstrations,
+            configuration=self.grid.configuration,
             needs=(demonstrate,),
         )
 

@@ -28,7 +28,8 @@ def write_results(plan: Plan, folder: Path) -> dict[str, Any]:
     for entry in plan.grid.entries:
         key = entry.task, entry.demonstrations
         if key not in references:
-            references = {key: plan.results(Entry(entry.task, REFERENCE, entry.demonstrations))}  # one task at a time
+            reference = Entry(entry.task, REFERENCE, entry.demonstrations)
+            references = {key: plan.results(reference) if reference in plan.targets else None}  # one task at a time
         by_seed = plan.results(entry)
         if by_seed is not None:
             cells.append(cell_report(entry, by_seed, references[key]))

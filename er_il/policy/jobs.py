@@ -41,6 +41,7 @@ class Train:
     steps: int
     seed: int
     demonstrations: int | None = None  # the first ones of the training episodes; all if None
+    configuration: str = ""  # kind of the shipped one, such as images_small; from states if empty
     needs: tuple[Job, ...] = ()
 
     @property
@@ -71,7 +72,7 @@ class Train:
     @property
     def training(self) -> Training:
         """The training; the dataset must be there."""
-        config = default_config(self.space)
+        config = default_config(self.space, self.configuration)
         return Training(
             self.task, self.space, self.dataset, self.out, config, self.steps, self.seed, self.demonstrations
         )
@@ -174,6 +175,6 @@ def _notes(cost: Cost) -> dict[str, Any]:
     return {"cost": asdict(cost), "git": git_sha()}
 
 
-def steps_of(space: str, steps: int | None) -> int:
+def steps_of(space: str, steps: int | None, configuration: str = "") -> int:
     """Number of training steps: those asked for, or as many as the space's configuration says."""
-    return default_steps(default_config(space)) if steps is None else steps
+    return default_steps(default_config(space, configuration)) if steps is None else steps

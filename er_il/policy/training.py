@@ -148,9 +148,9 @@ class Training:
         return [f"--steps={self.steps}"]
 
 
-def default_config(space: str) -> Path:
-    """Return the configuration that ships for a space, state-based."""
-    return data_dir("configs") / f"act_{split_name(space)[0]}.yaml"
+def default_config(space: str, kind: str = "") -> Path:
+    """Return the configuration that ships for a space: from states, or another kind, such as ``images_small``."""
+    return data_dir("configs") / f"{'_'.join(['act', split_name(space)[0], *filter(None, [kind])])}.yaml"
 
 
 def default_steps(config: Path) -> int:
