@@ -7,7 +7,6 @@ Configurations are uniform within the limits, seeds uniform within the seed erro
 back if no joint is off by more than 1e-3 rad; the causes of a miss are those of :mod:`er_il.round_trip`.
 """
 
-import json
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,6 +18,7 @@ from rich.progress import Progress
 from er_il import make_action_space
 from er_il.provenance import provenance
 from er_il.round_trip import CAUSES, EXACT, SINGULAR, round_trips
+from er_il.whole_file import write_json
 from er_il.workers import cores, run_jobs
 
 SPACES = ("erj", "era")
@@ -60,8 +60,7 @@ def main(samples: int = 3000, out: Path = Path("results/round_trip")) -> None:
         jobs = [(measure, *cell, samples) for cell in cells()]
         rows = run_jobs(jobs, cores(), lambda done, total: progress.update(bar, completed=done, total=total))
     meta = {"exact": EXACT, "ill_conditioned": SINGULAR, "rng_seed": 0}
-    out.mkdir(parents=True, exist_ok=True)
-    (out / "report.json").write_text(json.dumps({"meta": provenance() | meta, "round_trips": rows}, indent=1) + "\n")
+    write_json(out / "report.json", {"meta": provenance() | meta, "round_trips": rows})
 
 
 if __name__ == "__main__":

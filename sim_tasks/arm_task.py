@@ -77,9 +77,7 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
         self.lift = lift(self.arm)
         self.render_mode = render_mode
         self._start_range = start_range
-        spec = scene_spec(self.arm)
-        self._build(spec)
-        self._model = spec.compile()
+        self._model = self._spec().compile()
         self._data = mujoco.MjData(self._model)
         self._robot = RobotModel.of(self._model, self.arm)
         self._fingers = {self._model.body(name).id for name in FINGER_BODIES}
@@ -92,6 +90,12 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
         lower, upper = np.append(self.arm.lower, 0.0), np.append(self.arm.upper, 1.0)
         self.action_space = gym.spaces.Box(lower.astype(np.float32), upper.astype(np.float32))
         self.observation_space = self._make_observation_space(image_size)
+
+    def _spec(self) -> mujoco.MjSpec:
+        """The whole world: robot and bench with the task's things."""
+        spec = scene_spec(self.arm)
+        self._build(spec)
+        return spec
 
     @abstractmethod
     def _build(self, spec: mujoco.MjSpec) -> None:

@@ -12,7 +12,6 @@ from sim_tasks.contact import touching
 from sim_tasks.hand import hand_pose
 from sim_tasks.motion import Keyframe, Stretch, plan_stretch
 from sim_tasks.props import Goblet
-from sim_tasks.scene import scene_spec
 
 CUP = "cup"
 GRASP_HEIGHT = 0.09  # [m] of the fingertips above the surface the cup stands on, at mid-stem
@@ -100,9 +99,7 @@ class CupTask(ArmTask):
 
     @cached_property
     def _collisions(self) -> Collisions:
-        spec = scene_spec(self.arm)
-        self._build(spec)
-        return Collisions(spec, self.arm, self.obstacles, CLEARANCE)
+        return Collisions(self._spec(), self.arm, self.obstacles, CLEARANCE)
 
     def _script(self, rng: np.random.Generator) -> tuple[Sequence[Stretch], float]:
         x, y = self.object_pose(CUP)[:2]

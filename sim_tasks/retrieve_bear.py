@@ -21,7 +21,6 @@ from sim_tasks.hand import hand_pose
 from sim_tasks.household import BEAR, BOOKS, CACTUS, HEAD_HEIGHT, LAMP, VASE, Sideboard, Thing
 from sim_tasks.motion import Keyframe, Stretch, plan_stretch
 from sim_tasks.props import Wall
-from sim_tasks.scene import scene_spec
 
 GAP = 0.36  # x [m] at which the leader's hand comes through between vase and cactus, always at y = 0
 PITCH = np.radians(45)  # of the hand below the horizontal
@@ -138,9 +137,7 @@ class RetrieveBear(ArmTask):
 
     @cached_property
     def _collisions(self) -> Collisions:
-        spec = scene_spec(self.arm)
-        self._build(spec)
-        return Collisions(spec, self.arm, (*self.obstacles, *self.clutter), CLEARANCE)
+        return Collisions(self._spec(), self.arm, (*self.obstacles, *self.clutter), CLEARANCE)
 
     def _script(self, rng: np.random.Generator) -> tuple[Sequence[Stretch], float]:
         grasp = self.object_pose("bear")[:3] + np.array([0.0, 0.0, HEAD_HEIGHT])

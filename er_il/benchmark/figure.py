@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from er_il.benchmark import paper
 from er_il.showcase.pictures import INK
-from er_il.showcase.report import COLOURS, LABELS
+from er_il.showcase.report import COLOURS, label_of
 
 Cell = Mapping[str, Any]
 
@@ -29,7 +29,7 @@ def write_bars(cells: Sequence[Cell], path: Path) -> None:
         index = decoders.index(cell["decoder"])
         x = tasks.index(cell["task"]) + (index - (len(decoders) - 1) / 2) * width
         share, (low, high) = cell["successes"] / cell["episodes"], cell["interval"]
-        label = _label(cell["decoder"]) if cell["task"] == tasks[0] else None
+        label = label_of(cell["decoder"]) if cell["task"] == tasks[0] else None
         axis.bar(x, 100 * share, width=0.86 * width, color=colours[cell["decoder"]], label=label, zorder=2)
         axis.errorbar(x, 100 * share, yerr=_spread(share, low, high), color=INK, capsize=2, linewidth=1, zorder=3)
         published = paper.share(cell["task"], cell["decoder"])
@@ -68,7 +68,7 @@ def write_curves(cells: Sequence[Cell], path: Path) -> None:
                 yerr=spreads,
                 fmt="o-",
                 color=colours[decoder],
-                label=_label(decoder) if task == tasks[0] else None,
+                label=label_of(decoder) if task == tasks[0] else None,
                 markersize=4,
                 capsize=3,
             )
@@ -101,7 +101,3 @@ def _named(cells: Sequence[Cell], key: str) -> list[str]:
 def _colours(decoders: Sequence[str]) -> dict[str, str]:
     others = iter(OTHER_COLOURS * len(decoders))
     return {name: COLOURS.get(name) or next(others) for name in decoders}
-
-
-def _label(decoder: str) -> str:
-    return LABELS.get(decoder, decoder).replace("\n", " ")

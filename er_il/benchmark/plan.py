@@ -147,13 +147,8 @@ class Plan:
         parts = self.targets[entry]
         if not all(job.done for jobs in parts.values() for job in jobs):
             return None
-        return {seed: _joined([load_cell(job.path) for job in jobs]) for seed, jobs in parts.items()}
+        return {seed: Cell.joined([load_cell(job.path) for job in jobs]) for seed, jobs in parts.items()}
 
 
 def _variant(entry: Entry, seed: int, steps: int) -> str:
     return f"{entry.demonstrations}-demonstrations-{steps}-steps-seed-{seed}"
-
-
-def _joined(cells: list[Cell]) -> Cell:
-    episodes = tuple(episode for cell in cells for episode in cell.episodes)
-    return Cell(cells[0].task, cells[0].decoder, episodes)

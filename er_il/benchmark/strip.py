@@ -12,7 +12,7 @@ from er_il.policy.jobs import Train
 from er_il.policy.rollout import SUCCESS, record_rollout
 from er_il.schedule import FileResult, Job
 from er_il.showcase.pictures import Row, moments, write_strip
-from er_il.showcase.report import LABELS
+from er_il.showcase.report import label_of
 from er_il.showcase.showing import telling_seed
 
 DECODERS = ("joint", "erj", "task-nearest", "task-posture")  # as far as the grid has them
@@ -51,9 +51,8 @@ class Strip(FileResult):
         rows = []
         for decoder, trained in zip(self.decoders, self.policies, strict=True):
             trace, pictures = record_rollout(trained.training.policy, trained.task, decoder, self.seed, FILM_EVERY)
-            label = LABELS.get(decoder, decoder).replace("\n", " ")
             outcome = trace.outcome.replace("_", " ")
-            rows.append(Row(label, outcome, trace.outcome == SUCCESS, moments(pictures, PICTURES)))
+            rows.append(Row(label_of(decoder), outcome, trace.outcome == SUCCESS, moments(pictures, PICTURES)))
         self.path.parent.mkdir(parents=True, exist_ok=True)
         partial = self.path.with_suffix(".partial.png")
         write_strip(rows, partial)

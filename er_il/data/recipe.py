@@ -104,10 +104,9 @@ class Recipe:
         for name in ("episodes", "validation", "seed", "image_size"):
             if name in values and (not isinstance(values[name], int) or isinstance(values[name], bool)):
                 raise DatasetError(f"{name} is {values[name]!r}, not a whole number.")
-        if "disturbance" in values and (
-            not isinstance(values["disturbance"], int | float) or values["disturbance"] is True
-        ):
-            raise DatasetError(f"disturbance is {values['disturbance']!r}, not a number.")
+        disturbance = values.get("disturbance", 0.0)
+        if not isinstance(disturbance, int | float) or isinstance(disturbance, bool):
+            raise DatasetError(f"disturbance is {disturbance!r}, not a number.")
         return cls(**arguments)
 
     def to_dict(self) -> dict[str, Any]:

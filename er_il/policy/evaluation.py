@@ -53,6 +53,11 @@ class Cell:
     decoder: str
     episodes: tuple[Episode, ...]
 
+    @classmethod
+    def joined(cls, parts: Sequence["Cell"]) -> "Cell":
+        """Return all episodes of parts of the same cell."""
+        return cls(parts[0].task, parts[0].decoder, tuple(episode for part in parts for episode in part.episodes))
+
     @property
     def successes(self) -> int:
         """Number of successful episodes."""

@@ -100,7 +100,7 @@ class Demo:
         # All trainings at once, be they more than the cores: in turns, a core would idle beside the last.
         with LocalExecutor(max(workers, len(self.spaces))) as executor:
             self._train_and_roll_out(executor, progress)
-            cells = [self._cell(name) for name in self.decoders]
+            cells = [Cell.joined([load_cell(job.path) for job in self.rolling_out(name)]) for name in self.decoders]
             policies = {name: self.training(decoder(name).space).training.policy for name in self.decoders}
             try:
                 pictures = film_rollouts(executor, progress, policies, self.task, telling_seed(cells), self.out)
@@ -134,7 +134,3 @@ class Demo:
         schedule.run(executor, watch)
         for message in schedule.failed.values():
             raise ErIlError(message)
-
-    def _cell(self, name: str) -> Cell:
-        cells = [load_cell(job.path) for job in self.rolling_out(name)]
-        return Cell(self.task, name, tuple(episode for cell in cells for episode in cell.episodes))

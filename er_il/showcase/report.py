@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 REPORT, CHART, PAGE = "report.json", "success.png", "report.md"
 PICTURES = (".png", ".webp")  # shown on the page; other files are linked
-LABELS = {
+_LABELS = {
     "joint": "Joint",
     "erj": "ERJ",
     "era": "ERA",
@@ -29,6 +29,12 @@ COLOURS = {
     "task-mean": "#F0E442",
     "task-grasp": "#999999",
 }
+
+
+def label_of(decoder: str, *, broken: bool = False) -> str:
+    """A decoder's name for people, in one line unless it may be ``broken``."""
+    text = _LABELS.get(decoder, decoder)
+    return text if broken else text.replace("\n", " ")
 
 
 def success_table(cells: Sequence[Mapping[str, Any]]) -> str:
@@ -69,7 +75,7 @@ def write_chart(cells: Sequence[Mapping[str, Any]], path: Path) -> None:
         spread = 100 * np.array([[share - low], [high - share]])
         axis.errorbar(x, 100 * share, yerr=spread, color="#222222", capsize=5, linewidth=1.3, zorder=3)
         axis.text(x, 106, f"{cell['successes']}/{cell['episodes']}", ha="center", fontsize=9, color="#222222")
-        ticks.append((x, LABELS.get(cell["decoder"], cell["decoder"])))
+        ticks.append((x, label_of(cell["decoder"], broken=True)))
     axis.set_xticks([x for x, _ in ticks], [label for _, label in ticks], fontsize=9)
     axis.set_ylim(0, 114)
     axis.set_yticks(range(0, 101, 25))

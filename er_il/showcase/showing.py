@@ -13,7 +13,7 @@ from er_il.provenance import provenance
 from er_il.schedule import Executor
 from er_il.showcase.animation import Panel, write_animation
 from er_il.showcase.pictures import Picture, Row, moments, write_film, write_strip
-from er_il.showcase.report import LABELS, write_page
+from er_il.showcase.report import label_of, write_page
 
 FILM_EVERY = 2  # control steps a picture: shadows make each expensive
 MOMENTS = 5  # pictures of a rollout in the strip
@@ -68,12 +68,7 @@ def film_rollouts(
     rows = [job.result() for job in progress.track(jobs, description="Film a rollout each")]
     write_strip(rows, folder / STRIP)
     panels = [
-        Panel(
-            LABELS.get(name, name).replace("\n", " "),
-            row.outcome.replace("_", " "),
-            row.success,
-            folder / f"{name}.mp4",
-        )
+        Panel(label_of(name), row.outcome.replace("_", " "), row.success, folder / f"{name}.mp4")
         for name, row in zip(policies, rows, strict=True)
     ]
     write_animation(panels, folder / ANIMATION)
