@@ -2,7 +2,7 @@
 
 import time
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 from er_il.arm import Vector
 from er_il.errors import ErIlError, ShapeError, UnknownNameError
 from er_il.kinematics import Status
-from er_il.spaces import ActionSpace
+from er_il.spaces import ActionSpace, Decoded
+from er_il.spaces.pose import PoseSpace
 
 BEST_EFFORT, HOLD, STOP = "best_effort", "hold", "stop"
 ON_INVALID = (BEST_EFFORT, HOLD, STOP)
@@ -52,8 +53,9 @@ class Commander:
 
     An action that is not OK is answered as declared by ``on_invalid``:
 
-    - ``best_effort``: go as near to it as limits and IK allow, at no more than full speed; an
-      action that means nothing (``Status.INVALID``) leaves the last command standing.
+    - ``best_effort``: go as near to it as limits and IK allow, at no more than full speed, and of an
+      elbow far away towards it only as far as the pose is kept (:meth:`PoseSpace.ease`); an action
+      that means nothing (``Status.INVALID``) leaves the last command standing.
     - ``hold``: the last command stands.
     - ``stop``: the last command stands until the next reset.
 
@@ -111,40 +113,50 @@ class Commander:
         A person moved it, or another program: the velocity limit must then count from where it is.
         """
         assert self._last is not None
-        way = np.abs(np.asarray(q, dtype=np.float64) - self._last)
-        return bool(np.any(way > JUMP_PERIODS * self._reach))
+        return self._far(self._last, np.asarray(q, dtype=np.float64))
 
     def command(self, action: ArrayLike, q: ArrayLike) -> Command:
         """Turn an action (dim,) into the next command, given the measured joint angles q (n,) [rad]."""
         if self._last is None:
             raise RuntimeError("Commander.reset must be called before the first command.")
         started = time.perf_counter()
-        target, gripper, status, iters = self._decode(action, q)
+        decoded = self._decode(action, q)
+        status = decoded.status
+        follows = status is Status.OK or (self.on_invalid == BEST_EFFORT and status is not Status.INVALID)
+        target = self._eased(decoded, action, q) if follows else decoded.q
         latency = time.perf_counter() - started
         self._stopped |= self.on_invalid == STOP and status is not Status.OK
-        asked = float(np.max(np.abs(target - self._last)))
-        follows = status is Status.OK or (self.on_invalid == BEST_EFFORT and status is not Status.INVALID)
+        asked = float(np.max(np.abs(decoded.q - self._last)))
         ahead = self._limited(self._last, target)
         follows = follows and not self._stopped and not self._runs_away(ahead, q)
         if follows:
             self._last = ahead
-            self._gripper = gripper
+            self._gripper = decoded.gripper
         self.tally.statuses[status] += 1
         self.tally.latencies.append(latency)
         self.tally.largest_step = max(self.tally.largest_step, asked)
-        return Command(self._last.copy(), self._gripper, status, latency, iters, asked, follows, self._stopped)
+        return Command(self._last.copy(), self._gripper, status, latency, decoded.iters, asked, follows, self._stopped)
 
-    def _decode(self, action: ArrayLike, q: ArrayLike) -> tuple[Vector, float, Status, int]:
+    def _decode(self, action: ArrayLike, q: ArrayLike) -> Decoded:
         measured = np.asarray(q, dtype=np.float64)
         assert self._last is not None
         if not np.all(np.isfinite(measured)):
-            return self._last, self._gripper, Status.INVALID, 0
+            return Decoded(self._last, self._gripper, Status.INVALID)
         decoded = self.space.decode(action, seed=measured, current=self._last)
         if decoded.status is Status.INVALID:
-            return self._last, self._gripper, Status.INVALID, 0
-        far = np.any(np.abs(decoded.q - measured) > JUMP_PERIODS * self._reach)
-        status = Status.JUMP if far and decoded.status is Status.OK else decoded.status
-        return decoded.q, decoded.gripper, status, decoded.iters
+            return replace(decoded, q=self._last, gripper=self._gripper)
+        jumps = decoded.status is Status.OK and self._far(decoded.q, measured)
+        return replace(decoded, status=Status.JUMP) if jumps else decoded
+
+    def _eased(self, decoded: Decoded, action: ArrayLike, q: ArrayLike) -> Vector:
+        """Where to go: what was decoded or, if that is far, as much of it as lies near with its pose."""
+        measured = np.asarray(q, dtype=np.float64)
+        if not isinstance(self.space, PoseSpace) or not self._far(decoded.q, measured):
+            return decoded.q
+        return self.space.ease(action, measured, JUMP_PERIODS * self._reach)
+
+    def _far(self, target: Vector, measured: Vector) -> bool:
+        return bool(np.any(np.abs(target - measured) > JUMP_PERIODS * self._reach))
 
     def _runs_away(self, ahead: Vector, q: ArrayLike) -> bool:
         """Whether a command would leave behind an arm that does not come along: it waits for it instead."""

@@ -36,7 +36,7 @@ def test_the_velocity_limit_holds_between_successive_commands_and_keeps_the_dire
     assert first.joint_step == pytest.approx(4 * REACH[0])
 
 
-@pytest.mark.parametrize("kind", ["joint", "task", "erj"])
+@pytest.mark.parametrize("kind", ["joint", "task", "erj", "era"])
 @pytest.mark.parametrize("on_invalid", ["best_effort", "hold", "stop"])
 def test_whatever_the_policy_says_the_command_is_safe(kind: str, on_invalid: str):
     made = commander(kind, on_invalid)
@@ -83,6 +83,29 @@ def test_a_solution_on_another_branch_is_a_jump():
     assert joint.command(joint.space.encode(far_away()), PANDA.home).status is Status.JUMP
     near = PANDA.home + 4.9 * REACH
     assert joint.command(joint.space.encode(near), PANDA.home).status is Status.OK
+
+
+@pytest.mark.parametrize(
+    ("kind", "error", "arrives"), [("era", 0.02, False), ("era", -0.02, False), ("erj", 0.8, True), ("erj", -0.8, True)]
+)
+def test_towards_an_elbow_far_away_the_pose_is_kept(kind: str, error: float, arrives: bool):
+    # The upper arm stands upright, where joints 1 and 3 turn it alike: the arm angle hardly says which of them turns.
+    q = np.array([0.1, -0.01, -0.1, -1.96, 0.07, 3.17, 0.72])
+    made = commander(kind)
+    made.reset(q)
+    action = made.space.encode(q)
+    action[7] += error
+    pose, start = made.space.fk(q), q
+    statuses = []
+    for _ in range(30):
+        command = made.command(action, q)
+        statuses.append(command.status)
+        q = command.q
+        np.testing.assert_allclose(made.space.fk(q)[:3, 3], pose[:3, 3], atol=2e-3)
+    assert statuses[0] is Status.JUMP
+    if arrives:
+        assert statuses[-1] is Status.OK
+        assert q[0] - start[0] == pytest.approx(error, abs=1e-3)
 
 
 def test_best_effort_approaches_hold_waits_and_stop_stays():

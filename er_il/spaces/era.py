@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from er_il.arm import Vector
+from er_il.arm_angle import wrapped
 from er_il.kinematics import IkResult
 from er_il.spaces.base import Array
 from er_il.spaces.pose import PoseSpace
@@ -35,6 +36,9 @@ class EraSpace(PoseSpace):
 
     def conditioning(self, q: ArrayLike) -> float:
         return self.kinematics.conditioning(q, arm_angle=True)
+
+    def change(self, start: Vector, end: Vector) -> Vector:
+        return np.array([wrapped(turn) for turn in end - start])
 
     def solve(self, T_base_ee: Array, redundancy: Vector, seed: Vector) -> IkResult:
         return self.kinematics.solve(T_base_ee, seed, arm_angle=float(redundancy[0]))

@@ -13,6 +13,7 @@ from er_il.rotation import Quaternion, RotationCode, RotationError
 from er_il.spaces.base import ActionSpace, Array, Decoded
 
 POSITION_NAMES = ("ee.x", "ee.y", "ee.z")
+EASED = (0.5, 0.2, 0.1, 0.0)  # shares of the way to a redundancy value that is too far
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,14 +56,54 @@ class PoseSpace(ActionSpace):
         return np.column_stack([T_base_ee[:, :3, 3], self.rotation.encode(T_base_ee[:, :3, :3]), self.redundancy(q)])
 
     def _decode_arm(self, action: Vector, seed: Vector, current: Vector) -> Decoded:
+        try:
+            T_base_ee, redundancy = self._split(action)
+        except RotationError:
+            return Decoded(seed, 0.0, Status.INVALID)
+        return self.decode_pose(T_base_ee, redundancy, seed)
+
+    def _split(self, action: Vector) -> tuple[Array, Vector]:
+        """The pose (4, 4) and the redundancy values of a command (dim - 1,).
+
+        Raises:
+            RotationError: its rotation is none.
+        """
         split = len(POSITION_NAMES) + len(self.rotation.names)
         T_base_ee = np.eye(4)
         T_base_ee[:3, 3] = action[:3]
-        try:
-            T_base_ee[:3, :3] = self.rotation.decode(action[3:split])
-        except RotationError:
-            return Decoded(seed, 0.0, Status.INVALID)
-        return self.decode_pose(T_base_ee, action[split:], seed)
+        T_base_ee[:3, :3] = self.rotation.decode(action[3:split])
+        return T_base_ee, action[split:]
+
+    def ease(self, action: ArrayLike, seed: Vector, within: Vector) -> Vector:
+        """Meet an action's pose near a seed, and of its redundancy as much as lies on the way.
+
+        Near a singularity of what is commanded (for ERA on a Panda: the upper arm vertical), a redundancy value that is
+        off by a hundredth of a radian, as a policy's is, belongs to an elbow far away. The pose is met all the same.
+
+        Args:
+            action: (dim,) that decodes to joints far from the seed.
+            seed: (n,) [rad] the arm's measured angles.
+            within: (n,) [rad] how far each joint may be from the seed.
+
+        Returns:
+            Joint angles (n,) [rad]; if no redundancy between the seed's and the action's brings them near, those
+            nearest the seed with the pose alone.
+        """
+        command = np.asarray(action, dtype=np.float64)[:-1]
+        T_base_ee, wanted = self._split(command)
+        start = np.clip(seed, self.arm.lower, self.arm.upper)
+        if not len(wanted):
+            return self.solve(T_base_ee, wanted, start).q
+        present = self.redundancy(start[None])[0]
+        for share in EASED:
+            ik = self.solve(T_base_ee, present + share * self.change(present, wanted), start)
+            if ik.status is Status.OK and np.all(np.abs(ik.q - start) <= within):
+                return ik.q
+        return self.kinematics.solve(T_base_ee, start).q
+
+    def change(self, start: Vector, end: Vector) -> Vector:
+        """The way from one set of redundancy values to another."""
+        return end - start
 
     def decode_pose(self, T_base_ee: Array, redundancy: Vector, seed: Vector) -> Decoded:
         """Decode a pose (4, 4) and redundancy values; the gripper is left at 0."""
