@@ -15,7 +15,7 @@ from er_il.benchmark.table import compact_table
 from er_il.showcase.circle import drift_table
 from er_il.showcase.report import REPORT, success_table
 from er_il.study.arms_table import round_trips_table
-from er_il.study.tables import deltas_table, joints_table, validity_table
+from er_il.study.tables import deltas_table, joints_table, training_time_table, validity_table
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
@@ -28,6 +28,7 @@ TABLES: dict[str, Callable[[Mapping[str, Any]], str]] = {
     "workspace": joints_table,
     "drifts": deltas_table,
     "round_trips": round_trips_table,
+    "training_times": training_time_table,
     "cells": lambda report: success_table(report["cells"]),
 }
 

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from er_il.benchmark import REFERENCE
+from er_il.markdown import markdown_table
 
 Report = Mapping[str, Any]  # of results.json
 Cell = Mapping[str, Any]
@@ -27,7 +28,7 @@ def compact_table(report: Report, decoders: Sequence[str] = ()) -> str:
         for task in grid["tasks"]
         for count in counts
     ]
-    return _markdown([["Task", *["Demonstrations"] * several, *columns], *rows])
+    return markdown_table(["Task", *["Demonstrations"] * several, *columns], rows)
 
 
 def full_table(report: Report) -> str:
@@ -49,7 +50,7 @@ def full_table(report: Report) -> str:
         row.append(f"{cell['max_joint_step']:.3f} rad")
         row += [f"{100 * cell['elbow_error']:.1f} cm" if "elbow_error" in cell else NONE] * elbows
         rows.append(row)
-    return _markdown([headings, *rows])
+    return markdown_table(headings, rows)
 
 
 def percentages(interval: Sequence[float]) -> str:
@@ -69,8 +70,3 @@ def difference(cell: Cell) -> str:
 
 def _success(cell: Cell | None) -> str:
     return NONE if cell is None else f"**{cell['successes']}/{cell['episodes']}** ({percentages(cell['interval'])})"
-
-
-def _markdown(rows: Sequence[Sequence[str]]) -> str:
-    heading, *others = rows
-    return "\n".join(f"| {' | '.join(row)} |" for row in [heading, ["---"] * len(heading), *others])

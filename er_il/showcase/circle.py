@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from er_il.arm import Arm, Vector
 from er_il.errors import ArmError
 from er_il.kinematics import kinematics_of
+from er_il.markdown import markdown_table
 from er_il.provenance import provenance
 from er_il.spaces import make_action_space
 from er_il.spaces.pose import PoseSpace
@@ -92,11 +93,11 @@ def drift_table(report: Mapping[str, Any]) -> str:
     """Render a report as a Markdown table."""
     laps = range(1, report["meta"]["laps"] + 1)
     headings = ["Elbow from its start after", *(f"lap {lap}" for lap in laps), "Hand off its way by at most"]
-    rows = [headings, ["---"] * len(headings)]
+    rows = []
     for drive in report["drives"]:
         drift = [f"{100 * each:.1f} cm" for each in drive["drift"]]
         rows.append([NAMES[drive["solver"]], *drift, f"{1e3 * drive['max_position_error']:.2f} mm"])
-    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
+    return markdown_table(headings, rows)
 
 
 def _drive(name: str, solve: Solver, arm: Arm) -> Drive:

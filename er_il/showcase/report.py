@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from er_il.markdown import markdown_table
+
 REPORT, CHART, PAGE = "report.json", "success.png", "report.md"
 PICTURES = (".png", ".webp")  # shown on the page; other files are linked
 _LABELS = {
@@ -58,7 +60,7 @@ def success_table(cells: Sequence[Mapping[str, Any]]) -> str:
         if compared:
             row.append(f"{cell['max_joint_deviation']:.3f} rad")
         rows.append([*row, f"{cell['max_joint_step']:.3f} rad"])
-    return "\n".join(f"| {' | '.join(row)} |" for row in [headings, ["---"] * len(headings), *rows])
+    return markdown_table(headings, rows)
 
 
 def write_chart(cells: Sequence[Mapping[str, Any]], path: Path) -> None:

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from itertools import groupby
 from typing import Any
 
+from er_il.markdown import markdown_table
 from er_il.policy.statistics import exact_interval
 
 Report = Mapping[str, Any]
@@ -16,7 +17,7 @@ def round_trips_table(report: Report) -> str:
     headings = ["Arm", "Joints", "Space", "Commands", *(f"Back, seed ± {error:g} rad" for error in errors)]
     headings += [f"Why not, at ± {errors[0]:g} rad", "Away from singularities"]
     border = report["meta"]["ill_conditioned"]
-    lines = [headings, ["---"] * len(headings)]
+    lines = []
     for (arm, space), group in groupby(rows, key=lambda row: (row["arm"], row["space"])):
         cells = {row["seed_error"]: row for row in group}
         first = cells[errors[0]]
@@ -32,7 +33,7 @@ def round_trips_table(report: Report) -> str:
                 _others(first, border),
             ]
         )
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    return markdown_table(headings, lines)
 
 
 def _share(row: Report) -> str:

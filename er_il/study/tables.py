@@ -1,9 +1,10 @@
 """The studies' results as Markdown, rendered from their reports alone."""
 
 import itertools
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any
 
+from er_il.markdown import markdown_table
 from er_il.study.joint_notes import joined, risks
 from er_il.study.validity import SPACES
 from er_il.study.validity_report import shares
@@ -37,7 +38,7 @@ def validity_table(report: Report) -> str:
                 f"{p50:.1f} / {p99:.1f} ms",
             ]
         )
-    return f"{_table(headings, rows)}\n\n{_list(report['findings'])}"
+    return f"{markdown_table(headings, rows)}\n\n{_list(report['findings'])}"
 
 
 def joints_table(report: Report) -> str:
@@ -58,7 +59,7 @@ def joints_table(report: Report) -> str:
         + "."
         for each in report.get("training", [])
     ]
-    return f"{_table(headings, rows)}\n\n{_list([*report['notes'], *trained])}"
+    return f"{markdown_table(headings, rows)}\n\n{_list([*report['notes'], *trained])}"
 
 
 def deltas_table(report: Report) -> str:
@@ -74,7 +75,24 @@ def deltas_table(report: Report) -> str:
         ]
         for each in report["drifts"]
     ]
-    return _table(headings, rows)
+    return markdown_table(headings, rows)
+
+
+def training_time_table(report: Report) -> str:
+    """What a batch takes to load, and a step to update the policy, by LeRobot's own command and by er_il's."""
+    headings = ["Inputs", "Command", "Load a batch", "Update the policy", "Loading, of all", "Steps a second"]
+    rows = [
+        [
+            f"{each['inputs']}, batch {each['batch']}",
+            each["command"],
+            f"{1e3 * each['load_s']:.0f} ms",
+            f"{1e3 * each['update_s']:.0f} ms",
+            f"{each['load_s'] / (each['load_s'] + each['update_s']):.0%}",
+            f"{1 / (each['load_s'] + each['update_s']):.1f}",
+        ]
+        for each in report["training_times"]
+    ]
+    return markdown_table(headings, rows)
 
 
 def _by_joints(fitness: Iterable[Mapping[str, Any]]) -> dict[str, Mapping[str, Any]]:
@@ -83,10 +101,6 @@ def _by_joints(fitness: Iterable[Mapping[str, Any]]) -> dict[str, Mapping[str, A
 
 def _number(value: float | None) -> str:
     return "none, all do alike" if value is None else f"{value:.2f}"
-
-
-def _table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    return "\n".join(f"| {' | '.join(row)} |" for row in [headings, ["---"] * len(headings), *rows])
 
 
 def _list(sentences: Iterable[str]) -> str:
