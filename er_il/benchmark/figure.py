@@ -15,22 +15,35 @@ from er_il.showcase.report import COLOURS, label_of
 
 Cell = Mapping[str, Any]
 
-OTHER_COLOURS = ("#0072B2", "#882255", "#44AA99", "#DDCC77", "#332288")  # of decoders without a colour of their own
+# Of decoders without a colour of their own: Paul Tol's muted palette.
+OTHER_COLOURS = (
+    "#332288",
+    "#88CCEE",
+    "#44AA99",
+    "#117733",
+    "#999933",
+    "#DDCC77",
+    "#CC6677",
+    "#882255",
+    "#AA4499",
+)
+LEGEND_WIDTH = 2.1  # [in] of a column
 
 
 def write_bars(cells: Sequence[Cell], path: Path) -> None:
     """Draw the success of each decoder on each task, with exact 95 % intervals and the paper's figures beside."""
     tasks, decoders = _named(cells, "task"), _named(cells, "decoder")
-    figure = Figure(figsize=(1 + len(tasks) * (0.4 + 0.18 * len(decoders)), 4), dpi=140, layout="constrained")
+    width = 1 + len(tasks) * (0.4 + 0.18 * len(decoders))
+    figure = Figure(figsize=(width, 4), dpi=140, layout="constrained")
     axis = figure.subplots()
-    colours, width = _colours(decoders), 0.8 / len(decoders)
+    colours, bar = _colours(decoders), 0.8 / len(decoders)
     marked = False
     for cell in cells:
         index = decoders.index(cell["decoder"])
-        x = tasks.index(cell["task"]) + (index - (len(decoders) - 1) / 2) * width
+        x = tasks.index(cell["task"]) + (index - (len(decoders) - 1) / 2) * bar
         share, (low, high) = cell["successes"] / cell["episodes"], cell["interval"]
         label = label_of(cell["decoder"]) if cell["task"] == tasks[0] else None
-        axis.bar(x, 100 * share, width=0.86 * width, color=colours[cell["decoder"]], label=label, zorder=2)
+        axis.bar(x, 100 * share, width=0.86 * bar, color=colours[cell["decoder"]], label=label, zorder=2)
         axis.errorbar(x, 100 * share, yerr=_spread(share, low, high), color=INK, capsize=2, linewidth=1, zorder=3)
         published = paper.share(cell["task"], cell["decoder"])
         if published is not None:
@@ -43,7 +56,9 @@ def write_bars(cells: Sequence[Cell], path: Path) -> None:
     handles, labels = axis.get_legend_handles_labels()
     order = sorted(range(len(labels)), key=lambda i: isinstance(handles[i], Line2D))  # the marks last
     names = [labels[i] for i in order]
-    figure.legend([handles[i] for i in order], names, loc="outside upper left", ncols=4, fontsize=8, frameon=False)
+    columns = max(1, min(4, int(width / LEGEND_WIDTH)))
+    entries = [handles[i] for i in order]
+    figure.legend(entries, names, loc="outside upper left", ncols=columns, fontsize=8, frameon=False)
     figure.savefig(path)
 
 

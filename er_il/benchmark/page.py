@@ -14,6 +14,7 @@ TABLE, PAGE = "table.md", "README.md"
 BARS, CURVES = "table.png", "curves.png"
 STRIPS = "strip_*.png"  # one a task
 
+TASK_DECODERS = {"task-nearest", "task-posture"}
 MARGIN = 0.05  # a decoder does as well as the reference if its paired difference is, at 95 %, above minus this
 
 Report = Mapping[str, Any]
@@ -64,16 +65,21 @@ def _differences(report: Report) -> str:
     meta, grid = report["meta"], report["meta"]["grid"]
     episodes = report["cells"][0]["episodes"]
     steps = sorted(set(meta["training_steps"].values()))
+    marks = [paper.share(task, name) is not None for task in grid["tasks"] for name in grid["decoders"]]
     own = [task for task in grid["tasks"] if task not in paper.SUCCESSES]
     lines = [
         "Simulation: a Panda in MuJoCo, led by a scripted arm; the paper has two real ones, and a person who leads.",
         f"{_sight(grid)} They are small, trained for {' to '.join(map(str, steps))} steps on a CPU.",
-        f"{episodes} rollouts a cell instead of {paper.ROLLOUTS}; the diamonds are the paper's figures.",
-        "Task space is decoded by each of two rules (`task-nearest`: the solution nearest to the present joints; "
-        "`task-posture`: pulled to a comfortable posture), where the paper uses one solver, pick_ik. Its diamond "
-        "stands beside `task-nearest`.",
-        "Furniture, objects and their places follow the paper's description and pictures, not its measures.",
+        f"{episodes} rollouts a cell instead of {paper.ROLLOUTS}"
+        + ("; the diamonds are the paper's figures." if any(marks) else "."),
     ]
+    if TASK_DECODERS & set(grid["decoders"]):
+        lines.append(
+            "Task space is decoded by each of two rules (`task-nearest`: the solution nearest to the present joints; "
+            "`task-posture`: pulled to a comfortable posture), where the paper uses one solver, pick_ik. Its diamond "
+            "stands beside `task-nearest`."
+        )
+    lines.append("Furniture, objects and their places follow the paper's description and pictures, not its measures.")
     if "era" in grid["decoders"]:
         lines.append("ERA is in the table; the paper's real robot had joint, task and ERJ.")
     if own:

@@ -28,7 +28,7 @@ def joints(
     from er_il.cli.progress import make_progress
     from er_il.provenance import provenance
     from er_il.study.demos import study_demos
-    from er_il.study.joint_notes import joined
+    from er_il.study.joint_notes import training_notes
     from er_il.study.joints import study_joints
     from er_il.study.joints_figure import plot
     from er_il.study.prediction import predict, read_training
@@ -49,14 +49,8 @@ def joints(
     meta = provenance() | {"demos": {name: len(paths) for name, paths in of_sets.items()}}
     write_json(out / REPORT, {"meta": meta} | report)
     plot(report, out / "joints.png")
-    for note in report["notes"]:
+    for note in (*report["notes"], *training_notes(report)):
         console.print(note, highlight=False)
-    for each in report.get("training", []):
-        console.print(
-            f"{each['task']}: rank correlation of the advice with trained success {each['rank_correlation']}; "
-            f"its choice {joined([each['top_choice']])} is {'' if each['top_choice_is_best'] else 'not '}the best.",
-            highlight=False,
-        )
     console.print(f"{out / REPORT}\n{out / 'joints.png'}", highlight=False, soft_wrap=True)
 
 

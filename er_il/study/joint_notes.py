@@ -27,6 +27,19 @@ def risks(report: Report) -> dict[str, float]:
     }
 
 
+def training_notes(report: Report) -> list[str]:
+    """Sentences that compare the advice with policies that were trained, if there are any: a task each."""
+    return [
+        f"Trained on {each['task']}: the advised choice, {each['top_choice']}, is "
+        f"{'' if each['top_choice_is_best'] else 'not '}the best; rank correlation of low risk with success: "
+        + ("none, all do alike" if each["rank_correlation"] is None else f"{each['rank_correlation']:.2f}")
+        + ". "
+        + ", ".join(f"{row['joints']} {row['successes']}/{row['episodes']}" for row in each["choices"])
+        + "."
+        for each in report.get("training", [])
+    ]
+
+
 def _recommendation(report: Report) -> list[str]:
     best, second = (joined(choice) for choice in report["ranking"][:2])
     risk, where = risks(report), "of the workspace"

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from er_il.markdown import markdown_table
-from er_il.study.joint_notes import joined, risks
+from er_il.study.joint_notes import joined, risks, training_notes
 from er_il.study.validity import SPACES
 from er_il.study.validity_report import shares
 
@@ -52,14 +52,7 @@ def joints_table(report: Report) -> str:
         row = [f"`{name}`", f"{each['self_motion']:.2f}", f"{each['near_singular']:.0%}", f"{1 - each['missed']:.1%}"]
         row += [f"{of_set[name]['risk']:.0%} ({of_set[name]['flips']:.1f})" for of_set in demos]
         rows.append(row)
-    trained = [
-        f"Training on {each['task']} {'bears this out' if each['top_choice_is_best'] else 'picks another joint'}: "
-        f"rank correlation {_number(each['rank_correlation'])}, advised {each['top_choice']}; "
-        + ", ".join(f"{row['joints']} {row['successes']}/{row['episodes']}" for row in each["choices"])
-        + "."
-        for each in report.get("training", [])
-    ]
-    return f"{markdown_table(headings, rows)}\n\n{_list([*report['notes'], *trained])}"
+    return f"{markdown_table(headings, rows)}\n\n{_list([*report['notes'], *training_notes(report)])}"
 
 
 def deltas_table(report: Report) -> str:
@@ -97,10 +90,6 @@ def training_time_table(report: Report) -> str:
 
 def _by_joints(fitness: Iterable[Mapping[str, Any]]) -> dict[str, Mapping[str, Any]]:
     return {joined(each["joints"]): each for each in fitness}
-
-
-def _number(value: float | None) -> str:
-    return "none, all do alike" if value is None else f"{value:.2f}"
 
 
 def _list(sentences: Iterable[str]) -> str:
