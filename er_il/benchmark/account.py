@@ -45,8 +45,8 @@ class Account:
 
     def __post_init__(self) -> None:
         self._entries = {job: entry for entry, seeds in self.plan.targets.items() for job in _flat(seeds.values())}
-        total = self.plan.grid.rollouts * len(self.plan.grid.training_seeds)
-        self.scores = {entry: Score(total) for entry in self.plan.targets}
+        rollouts = self.plan.grid.rollouts
+        self.scores = {entry: Score(rollouts * len(seeds)) for entry, seeds in self.plan.targets.items()}
         self.update()
 
     def update(self) -> list[Entry]:

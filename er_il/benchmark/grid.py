@@ -102,6 +102,10 @@ class Grid:
         recipe = replace(Recipe.load(task, self.arm), cameras=self.cameras.get(task, ()))
         return recipe if self.episodes is None else recipe.resized(self.episodes)
 
+    def seeds_of(self, entry: Entry) -> tuple[int, ...]:
+        """Training seeds whose policies an entry rolls out: all, but for sceptics' decoders only the first."""
+        return self.training_seeds[:1] if entry.decoder in SCEPTICS else self.training_seeds
+
     @property
     def entries(self) -> tuple[Entry, ...]:
         """The cells, task by task, the sceptics' ones last."""

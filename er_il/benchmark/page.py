@@ -111,8 +111,9 @@ def _sceptics(report: Report) -> str:
             not_enough.append(f"`{task}`")
     return "\n\n".join(
         [
-            "Task space with its null space pulled to one posture of the demonstrations, the same policies: their mean "
-            "joint angles (`task-mean`), or those at the grasp or the press (`task-grasp`).",
+            "Task space with its null space pulled to one posture of the demonstrations: their mean joint angles "
+            "(`task-mean`), or those at the grasp or the press (`task-grasp`). The same policies, those of the first "
+            "training seed.",
             compact_table(report, (REFERENCE, *names)),
             f"- That is enough on: {', '.join(enough) or 'none of the tasks'}.\n"
             f"- It is not enough on: {', '.join(not_enough) or 'none of the tasks'}.",

@@ -133,14 +133,16 @@ class Plan:
     @cached_property
     def targets(self) -> dict[Entry, dict[int, list[RollOut]]]:
         """The rollouts of each entry and training seed."""
-        seeds = self.grid.training_seeds
-        return {entry: {seed: self.rolling_out(entry, seed) for seed in seeds} for entry in self.grid.entries}
+        return {
+            entry: {seed: self.rolling_out(entry, seed) for seed in self.grid.seeds_of(entry)}
+            for entry in self.grid.entries
+        }
 
     @property
     def jobs(self) -> list[RollOut]:
         """All rollouts, the first training seed of every entry first: an early look at the whole table."""
         pairs = product(self.grid.training_seeds, self.grid.entries)
-        return [job for seed, entry in pairs for job in self.targets[entry][seed]]
+        return [job for seed, entry in pairs for job in self.targets[entry].get(seed, ())]
 
     def results(self, entry: Entry) -> dict[int, Cell] | None:
         """The rollouts of an entry by training seed; None as long as one is missing."""
