@@ -30,8 +30,14 @@ OTHER_COLOURS = (
 LEGEND_WIDTH = 2.1  # [in] of a column
 
 
-def write_bars(cells: Sequence[Cell], path: Path) -> None:
-    """Draw the success of each decoder on each task, with exact 95 % intervals and the paper's figures beside."""
+def write_bars(cells: Sequence[Cell], path: Path, *, compared: bool = True) -> None:
+    """Draw the success of each decoder on each task, with exact 95 % intervals.
+
+    Args:
+        cells: What was counted.
+        path: Picture to write.
+        compared: Whether to mark the paper's figures beside.
+    """
     tasks, decoders = _named(cells, "task"), _named(cells, "decoder")
     width = 1 + len(tasks) * (0.4 + 0.18 * len(decoders))
     figure = Figure(figsize=(width, 4), dpi=140, layout="constrained")
@@ -45,7 +51,7 @@ def write_bars(cells: Sequence[Cell], path: Path) -> None:
         label = label_of(cell["decoder"]) if cell["task"] == tasks[0] else None
         axis.bar(x, 100 * share, width=0.86 * bar, color=colours[cell["decoder"]], label=label, zorder=2)
         axis.errorbar(x, 100 * share, yerr=_spread(share, low, high), color=INK, capsize=2, linewidth=1, zorder=3)
-        published = paper.share(cell["task"], cell["decoder"])
+        published = paper.share(cell["task"], cell["decoder"]) if compared else None
         if published is not None:
             label = f"the paper's, of {paper.ROLLOUTS} on a real arm" if not marked else None
             axis.plot(x, 100 * published, "D", color="white", markeredgecolor=INK, markersize=5, label=label, zorder=4)

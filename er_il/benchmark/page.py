@@ -26,8 +26,11 @@ def write_pages(folder: Path) -> None:
     if not report["cells"]:
         return
     curves = len(report["meta"]["grid"]["demonstrations"]) > 1
-    figure, write = (CURVES, write_curves) if curves else (BARS, write_bars)
-    write(report["cells"], folder / figure)
+    figure = CURVES if curves else BARS
+    if curves:
+        write_curves(report["cells"], folder / figure)
+    else:
+        write_bars(report["cells"], folder / figure, compared=_compared(report))
     (folder / TABLE).write_text(full_table(report) + "\n")
     strips = sorted(path.name for path in folder.glob(STRIPS))
     (folder / PAGE).write_text("\n\n".join(_page(report, figure, strips)) + "\n")
@@ -39,7 +42,7 @@ def _page(report: Report, figure: str, strips: list[str]) -> list[str]:
     page.append(f"![Success of each decoder]({figure})")
     if missing := [f"{each['task']} {each['decoder']}" for each in meta["missing"]]:
         page.append(f"Not complete: {', '.join(missing)}.")
-    if any(task in paper.SUCCESSES for task in meta["grid"]["tasks"]):
+    if _compared(report):
         page += ["## What differs from the paper", _differences(report)]
     if meta["grid"]["sceptics"]:
         page += ["## Would a fixed posture do?", _sceptics(report)]
@@ -47,6 +50,12 @@ def _page(report: Report, figure: str, strips: list[str]) -> list[str]:
         page += ["## The same start through each decoder", *(f"![{name[:-4]}]({name})" for name in strips)]
     page += ["## Every cell", full_table(report), _legend(report), "## How it was made", _origin(report)]
     return [paragraph for paragraph in page if paragraph]
+
+
+def _compared(report: Report) -> bool:
+    """Whether the paper did the like: any of the tasks, with a Panda's seven joints."""
+    grid = report["meta"]["grid"]
+    return grid["arm"] == paper.ARM and any(task in paper.SUCCESSES for task in grid["tasks"])
 
 
 def _counts(report: Report) -> str:

@@ -1,5 +1,6 @@
 """What the paper measured on a real arm (its table of imitation learning), ten rollouts a figure."""
 
+ARM = "panda"
 ROLLOUTS = 10
 
 # Task -> action space -> successes of ten. The paper has one decoder of task space, MoveIt with pick_ik.
