@@ -103,7 +103,7 @@ def train_in_process(monkeypatch: pytest.MonkeyPatch, *options: str) -> None:
     """Let ``er-il train`` run its stock command in this process, with more options."""
 
     def train(training: Training, output: object = None) -> int:
-        training.clear()
+        training.prepare()
         run(*training.command, *options)
         return 0
 

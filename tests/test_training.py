@@ -1,6 +1,7 @@
 import json
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -116,6 +117,24 @@ def test_from_demonstrations_to_a_rollout_with_the_stock_commands(
         run(monkeypatch, lerobot_eval.main, *rollout, "--env.action_space=joint", f"--output_dir={tmp_path / 'no'}")
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("one_thread")
+def test_from_images_to_a_rollout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    recipe = replace(Recipe.load("push_button_elbow").resized(2), cameras=("shoulder",), image_size=32)
+    generate(recipe, ["erj"], tmp_path / "data", Progress(disable=True), workers=1)
+    changes = {"dataset": tmp_path / "data" / "erj", "config": default_config("erj", "images_small")}
+    stock, in_memory = (training(tmp_path, tmp_path / name, **changes) for name in ("stock", "in_memory"))
+    stock.prepare()
+    run(monkeypatch, lerobot_train.main, *stock.command[1:])
+    assert in_memory.run() == 0
+    weights = [each.policy / "model.safetensors" for each in (stock, in_memory)]
+    assert weights[0].read_bytes() == weights[1].read_bytes()
+    seen = json.loads((stock.policy / "config.json").read_text())["input_features"]
+    assert set(seen) == {"observation.state", "observation.images.shoulder"}  # the button has to be found
+    (episode,) = evaluate(stock.policy, "push_button_elbow", "erj", episodes=1, batch_size=1).episodes
+    assert episode.steps > 5  # two steps of training may well press it
+
+
 def test_a_dataset_that_lerobot_edited_trains_on_all_that_is_left(
     datasets: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
@@ -131,11 +150,11 @@ def test_a_dataset_that_lerobot_edited_trains_on_all_that_is_left(
 def test_an_interruption_before_the_first_checkpoint_is_cleared_away(datasets: Path, tmp_path: Path):
     begun = training(datasets, tmp_path / "out")
     (begun.out / "checkpoints" / "000500").mkdir(parents=True)
-    begun.clear()
+    begun.prepare()
     assert not begun.out.exists()
     (begun.out / "thesis").mkdir(parents=True)
     with pytest.raises(PolicyError, match="thesis"):
-        begun.clear()
+        begun.prepare()
     assert (begun.out / "thesis").exists()
 
 

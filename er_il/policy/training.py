@@ -18,6 +18,7 @@ from er_il.errors import DatasetError, PolicyError
 from er_il.policy.contract import Contract, dataset_info
 from er_il.resources import data_dir
 from er_il.spaces import check_space, split_name
+from er_il.whole_file import write_whole
 from er_il.workers import end_with_parent
 
 STOCK = "lerobot-train"
@@ -68,14 +69,15 @@ class Training:
         info = dataset_info(self.dataset)
         contract = Contract.of_spec(action_spec(info["features"]))
         inputs = input_features(self.config, info["features"])
+        own = self._renames(inputs)
         return [
             STOCK,
-            f"--config_path={self.config}",
+            f"--config_path={self.own_config if own else self.config}",
             f"--dataset.repo_id=er_il/{self.task}_{self.space}",
             f"--dataset.root={self.dataset}",
             f"--dataset.episodes={json.dumps(self._episodes(info), separators=(',', ':'))}",
             f"--policy.tags={json.dumps([contract.tag])}",
-            *([f"--policy.input_features={json.dumps(inputs)}"] if inputs else []),
+            *([f"--policy.input_features={json.dumps(inputs)}"] if inputs and not own else []),
             f"--output_dir={self.out}",
             f"--seed={self.seed}",
             *self._length,
@@ -97,14 +99,31 @@ class Training:
         """Folder of the trained policy."""
         return self.out / _CHECKPOINTS / _LAST / _PRETRAINED
 
-    def clear(self) -> None:
-        """Remove what an interruption before the first checkpoint left, which LeRobot would stumble over.
+    @property
+    def own_config(self) -> Path:
+        """The configuration with the dataset's cameras, where it names others."""
+        return self.out.with_name(f"{self.out.name}.yaml")
+
+    def prepare(self) -> None:
+        """Make ready for the command: remove what an interruption left, write what it reads.
+
+        An interruption before the first checkpoint leaves what LeRobot would stumble over. And inputs of the command
+        line do not replace those of a configuration but come on top, so that other cameras take a configuration.
 
         Raises:
             PolicyError: the folder holds something else.
         """
-        if self._checkpoint is not None or not self.out.exists():
+        if self._checkpoint is not None:
             return
+        if self.out.exists():
+            self._clear()
+        inputs = input_features(self.config, dataset_info(self.dataset)["features"])
+        if self._renames(inputs):
+            values = yaml.safe_load(self.config.read_text())
+            values["policy"]["input_features"] = inputs
+            write_whole(self.own_config, lambda path: path.write_text(yaml.safe_dump(values, sort_keys=False)))
+
+    def _clear(self) -> None:
         if strangers := [path.name for path in self.out.iterdir() if path.name != _CHECKPOINTS]:
             raise PolicyError(f"{self.out} holds {strangers[0]!r} but no training to resume; choose another --out.")
         shutil.rmtree(self.out)
@@ -118,12 +137,16 @@ class Training:
         Raises:
             PolicyError: the output folder holds something else.
         """
-        self.clear()
+        self.prepare()
         command = [sys.executable, "-m", IN_MEMORY, *self.command[1:]]
         environment = ONE_THREAD | os.environ
         return subprocess.run(
             command, env=environment, stdout=output, stderr=output, check=False, preexec_fn=end_with_parent
         ).returncode
+
+    def _renames(self, inputs: Mapping[str, Any]) -> bool:
+        """Whether the dataset has other inputs than the configuration names."""
+        return bool(inputs) and inputs.keys() != _named_inputs(self.config).keys()
 
     def _episodes(self, info: Mapping[str, Any]) -> list[int]:
         episodes = train_episodes(info)
@@ -178,7 +201,7 @@ def input_features(config: Path, features: Mapping[str, Any]) -> dict[str, dict[
     Raises:
         PolicyError: the dataset lacks an input, or has no camera where the configuration has one.
     """
-    named = yaml.safe_load(config.read_text()).get("policy", {}).get("input_features") or {}
+    named = _named_inputs(config)
     inputs = {key: feature for key, feature in named.items() if not key.startswith(IMAGES)}
     if missing := [key for key in inputs if key not in features]:
         raise PolicyError(f"{config} wants {', '.join(missing)}, which the dataset does not have.")
@@ -190,6 +213,10 @@ def input_features(config: Path, features: Mapping[str, Any]) -> dict[str, dict[
         inputs |= {key: {"type": "VISUAL"} for key in cameras}
         shapes |= {key: [channels, height, width] for key, (height, width, channels) in cameras.items()}
     return {key: {"type": feature["type"], "shape": list(shapes[key])} for key, feature in inputs.items()}
+
+
+def _named_inputs(config: Path) -> dict[str, dict[str, Any]]:
+    return yaml.safe_load(config.read_text()).get("policy", {}).get("input_features") or {}
 
 
 def pretrained(path: Path) -> Path:
