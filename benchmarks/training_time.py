@@ -22,7 +22,8 @@ from rich.progress import Progress
 
 from er_il.data.recipe import Recipe
 from er_il.data.recording import generate
-from er_il.policy.training import IN_MEMORY, ONE_THREAD, STOCK, Training, default_config
+from er_il.policy.configuration import default_config
+from er_il.policy.training import IN_MEMORY, ONE_THREAD, STOCK, Training
 from er_il.provenance import provenance
 from er_il.whole_file import write_json
 

@@ -13,8 +13,9 @@ from er_il import cli
 from er_il.data.recipe import Recipe
 from er_il.data.recording import generate
 from er_il.errors import DatasetError, PolicyError, UnknownNameError
+from er_il.policy.configuration import default_config, input_features
 from er_il.policy.evaluation import evaluate
-from er_il.policy.training import Training, default_config, input_features, pretrained
+from er_il.policy.training import Training, pretrained
 
 RECIPE = Recipe.load("reach_cup").resized(3)
 

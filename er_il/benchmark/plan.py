@@ -16,11 +16,11 @@ from er_il.benchmark.grid import Entry, Grid
 from er_il.data.record import Record
 from er_il.data.recording import generate
 from er_il.errors import ErIlError
+from er_il.policy.configuration import default_config
 from er_il.policy.evaluation import Cell
 from er_il.policy.jobs import RollOut, Train, roll_outs, steps_of
 from er_il.policy.postures import space_of
 from er_il.policy.results import load_cell
-from er_il.policy.training import default_config
 from er_il.whole_file import write_whole
 
 OWNER = "benchmark.json"

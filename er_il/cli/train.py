@@ -31,7 +31,8 @@ def train(
     import shlex
     import sys
 
-    from er_il.policy.training import Training, default_config, default_steps
+    from er_il.policy.configuration import default_config, default_steps
+    from er_il.policy.training import Training
     from er_il.spaces import check_space
     from er_il.tasks import task_id
 

@@ -16,12 +16,13 @@ from er_il.data.record import read_episodes
 from er_il.data.schema import action_spec
 from er_il.errors import ErIlError
 from er_il.policy.actor import POLICY_ROWS
+from er_il.policy.configuration import default_config, default_steps
 from er_il.policy.contract import dataset_info
 from er_il.policy.elbow import ElbowReference
 from er_il.policy.evaluation import FIRST_SEED, evaluate
 from er_il.policy.postures import POSTURE_DECODER, SCEPTICS
 from er_il.policy.results import save_cell
-from er_il.policy.training import Training, default_config, default_steps, train_episodes
+from er_il.policy.training import Training, train_episodes
 from er_il.provenance import git_sha
 from er_il.schedule import FileResult, Job
 from er_il.spaces import from_spec

@@ -13,10 +13,10 @@ from typing import IO, Any
 import yaml
 
 from er_il.data.recipe import TRAIN
-from er_il.data.schema import IMAGES, action_spec
+from er_il.data.schema import action_spec
 from er_il.errors import DatasetError, PolicyError
+from er_il.policy.configuration import input_features, named_inputs
 from er_il.policy.contract import Contract, dataset_info
-from er_il.resources import data_dir
 from er_il.spaces import check_space, split_name
 from er_il.whole_file import write_whole
 from er_il.workers import end_with_parent
@@ -146,7 +146,7 @@ class Training:
 
     def _renames(self, inputs: Mapping[str, Any]) -> bool:
         """Whether the dataset has other inputs than the configuration names."""
-        return bool(inputs) and inputs.keys() != _named_inputs(self.config).keys()
+        return bool(inputs) and inputs.keys() != named_inputs(self.config).keys()
 
     def _episodes(self, info: Mapping[str, Any]) -> list[int]:
         episodes = train_episodes(info)
@@ -169,54 +169,6 @@ class Training:
     @property
     def _length(self) -> list[str]:
         return [f"--steps={self.steps}"]
-
-
-def default_config(space: str, kind: str = "") -> Path:
-    """Return the configuration that ships for a space: from states, or another kind, such as ``images_small``."""
-    return data_dir("configs") / f"{'_'.join(['act', split_name(space)[0], *filter(None, [kind])])}.yaml"
-
-
-def default_steps(config: Path) -> int:
-    """Return the number of steps that a configuration asks for.
-
-    Raises:
-        PolicyError: the configuration is missing or does not say.
-    """
-    try:
-        return int(yaml.safe_load(config.read_text())["steps"])
-    except (OSError, yaml.YAMLError, KeyError, TypeError, ValueError) as error:
-        raise PolicyError(f"There is no training configuration {config} that says how many steps to take.") from error
-
-
-def input_features(config: Path, features: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Return what a policy sees of a dataset: the inputs that a configuration names, in the dataset's own shapes.
-
-    A configuration holds the shapes of the cup tasks on an arm with seven joints. Where it names a camera, all
-    cameras of the dataset take its place. Empty if it names nothing: LeRobot then takes all there is.
-
-    Args:
-        config: Configuration of the training.
-        features: The dataset's features, as in its ``info.json``.
-
-    Raises:
-        PolicyError: the dataset lacks an input, or has no camera where the configuration has one.
-    """
-    named = _named_inputs(config)
-    inputs = {key: feature for key, feature in named.items() if not key.startswith(IMAGES)}
-    if missing := [key for key in inputs if key not in features]:
-        raise PolicyError(f"{config} wants {', '.join(missing)}, which the dataset does not have.")
-    shapes = {key: features[key]["shape"] for key in inputs}
-    if len(inputs) < len(named):
-        cameras = {key: feature["shape"] for key, feature in features.items() if key.startswith(IMAGES)}
-        if not cameras:
-            raise PolicyError(f"{config} is for images; the dataset has none. Record it with --cameras.")
-        inputs |= {key: {"type": "VISUAL"} for key in cameras}
-        shapes |= {key: [channels, height, width] for key, (height, width, channels) in cameras.items()}
-    return {key: {"type": feature["type"], "shape": list(shapes[key])} for key, feature in inputs.items()}
-
-
-def _named_inputs(config: Path) -> dict[str, dict[str, Any]]:
-    return yaml.safe_load(config.read_text()).get("policy", {}).get("input_features") or {}
 
 
 def pretrained(path: Path) -> Path:
