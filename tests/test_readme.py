@@ -16,7 +16,7 @@ def test_the_pages_tables_are_rendered_from_the_results() -> None:
         text = page.read_text()
         found += [name for _, name, _ in renderer["BLOCK"].findall(text)]
         assert renderer["rendered"](text) == text, "run docs/render_readme.py"
-    assert {"results/demo", "results/circle", "results/replay", "results/lift_cup"} <= set(found)
+    assert {"results/table1", "results/demo", "results/circle", "results/replay", "results/lift_cup"} <= set(found)
     assert {"results/joints", "results/validity", "results/deltas", "results/panda8"} <= set(found)
 
 
