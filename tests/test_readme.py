@@ -23,8 +23,8 @@ def test_the_pages_tables_are_rendered_from_the_results() -> None:
 def test_every_task_is_in_the_tables_with_its_time() -> None:
     readme, page = (ROOT / "README.md").read_text(), (ROOT / "docs" / "tasks.md").read_text()
     for task in TASKS:
-        row = next(line for line in readme.splitlines() if line.startswith(f"| `{task.task}`"))
-        assert row.endswith(f"| {task.max_steps / RATE:g} s |")
+        rows = [line for line in readme.splitlines() if line.startswith(f"| `{task.task}`")]
+        assert any(row.endswith(f"| {task.max_steps / RATE:g} s |") for row in rows)
         assert f"`{task.task}`" in page
         assert f"images/tasks/{task.task}.webp" in page
         assert (ROOT / "docs" / "images" / "tasks" / f"{task.task}.webp").stat().st_size < 200_000
