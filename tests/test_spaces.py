@@ -41,6 +41,18 @@ def test_er_spaces_return_the_joints(kind, seed_error, share, rotation):
 
 
 @pytest.mark.parametrize("kind", ["erj", "era"])
+def test_er_spaces_return_the_joints_from_seeds_a_tenth_of_a_radian_away(kind):
+    """Away by the distance, all joints together, where the test above has each joint off by as much."""
+    space, rng = make_action_space(kind, PANDA), np.random.default_rng(0)
+    exact = []
+    for q in rng.uniform(PANDA.lower, PANDA.upper, (1000, PANDA.dof)):
+        way = rng.normal(size=PANDA.dof)
+        seed = np.clip(q + rng.uniform(0.0, 0.1) * way / np.linalg.norm(way), PANDA.lower, PANDA.upper)
+        exact.append(np.abs(space.decode(space.encode(q), seed).q - q).max() <= EXACT)
+    assert np.mean(exact) >= 0.99
+
+
+@pytest.mark.parametrize("kind", ["erj", "era"])
 def test_er_spaces_return_the_joints_wherever_the_arm_is_well_conditioned(kind):
     space = make_action_space(kind, PANDA)
     trips = [trip for trip in round_trips(space, 400, rng_seed=1) if trip.conditioning >= SINGULAR]
