@@ -8,6 +8,7 @@ import subprocess
 import sys
 import urllib.request
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from urllib.parse import parse_qs, urlsplit
@@ -235,7 +236,9 @@ def test_a_served_episode_reaches_the_browser(shown: SimpleNamespace, tmp_path: 
     read_source(shown.root, EPISODE)[0].save(tmp_path / "trace.npz")
     # Its own process: on Ctrl-C it must end, and by itself it must not.
     command = [sys.executable, "-c", "from er_il.cli import main; main()", "view", str(tmp_path / "trace.npz")]
-    with subprocess.Popen([*command, "--serve"], stdout=subprocess.PIPE, text=True) as server:
+    # Where the tests run in the background, Ctrl-C is ignored, and children inherit that.
+    heeds = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    with subprocess.Popen([*command, "--serve"], stdout=subprocess.PIPE, text=True, preexec_fn=heeds) as server:
         try:
             assert server.stdout is not None
             address = urlsplit(server.stdout.readline().strip())
@@ -244,7 +247,10 @@ def test_a_served_episode_reaches_the_browser(shown: SimpleNamespace, tmp_path: 
             assert re.fullmatch(r"rerun\+http://127\.0\.0\.1:\d+/proxy", parse_qs(address.query)["url"][0])
         finally:
             server.send_signal(signal.SIGINT)
-        assert server.wait() == 0
+        try:
+            assert server.wait(timeout=60) == 0
+        finally:
+            server.kill()  # else the block would wait for it
 
 
 @pytest.mark.parametrize(
