@@ -151,9 +151,10 @@ class Commander:
     def _eased(self, decoded: Decoded, action: ArrayLike, q: ArrayLike) -> Vector:
         """Where to go: what was decoded or, if that is far, as much of it as lies near with its pose."""
         measured = np.asarray(q, dtype=np.float64)
-        if not isinstance(self.space, PoseSpace) or not self._far(decoded.q, measured):
-            return decoded.q
-        return self.space.ease(action, measured, JUMP_PERIODS * self._reach)
+        space = self.space
+        if isinstance(space, PoseSpace) and space.redundancy_names and self._far(decoded.q, measured):
+            return space.ease(action, measured, JUMP_PERIODS * self._reach)
+        return decoded.q
 
     def _far(self, target: Vector, measured: Vector) -> bool:
         return bool(np.any(np.abs(target - measured) > JUMP_PERIODS * self._reach))

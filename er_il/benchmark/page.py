@@ -25,11 +25,11 @@ def write_pages(folder: Path) -> None:
     report = json.loads((folder / RESULTS).read_text())
     if not report["cells"]:
         return
-    curves = len(report["meta"]["grid"]["demonstrations"]) > 1
-    figure = CURVES if curves else BARS
-    if curves:
+    if len(report["meta"]["grid"]["demonstrations"]) > 1:
+        figure = CURVES
         write_curves(report["cells"], folder / figure)
     else:
+        figure = BARS
         write_bars(report["cells"], folder / figure, compared=_compared(report))
     (folder / TABLE).write_text(full_table(report) + "\n")
     strips = sorted(path.name for path in folder.glob(STRIPS))

@@ -14,7 +14,8 @@ from er_il.spaces import split_name
 
 def default_config(space: str, kind: str = "") -> Path:
     """Return the configuration that ships for a space: from states, or another kind, such as ``images_small``."""
-    return data_dir("configs") / f"{'_'.join(['act', split_name(space)[0], *filter(None, [kind])])}.yaml"
+    suffix = f"_{kind}" if kind else ""
+    return data_dir("configs") / f"act_{split_name(space)[0]}{suffix}.yaml"
 
 
 def default_steps(config: Path) -> int:

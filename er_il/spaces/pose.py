@@ -81,7 +81,7 @@ class PoseSpace(ActionSpace):
         off by a hundredth of a radian, as a policy's is, belongs to an elbow far away. The pose is met all the same.
 
         Args:
-            action: (dim,) that decodes to joints far from the seed.
+            action: (dim,) with redundancy values, that decodes to joints far from the seed.
             seed: (n,) [rad] the arm's measured angles.
             within: (n,) [rad] how far each joint may be from the seed.
 
@@ -92,8 +92,6 @@ class PoseSpace(ActionSpace):
         command = np.asarray(action, dtype=np.float64)[:-1]
         T_base_ee, wanted = self._split(command)
         start = np.clip(seed, self.arm.lower, self.arm.upper)
-        if not len(wanted):
-            return self.solve(T_base_ee, wanted, start).q
         present = self.redundancy(start[None])[0]
         for share in EASED:
             ik = self.solve(T_base_ee, present + share * self.change(present, wanted), start)
