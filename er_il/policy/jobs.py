@@ -1,6 +1,7 @@
 """Training a policy and rolling it out, as jobs that resume and leave files."""
 
 import json
+import os
 import re
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
@@ -22,7 +23,7 @@ from er_il.policy.elbow import ElbowReference
 from er_il.policy.evaluation import FIRST_SEED, evaluate
 from er_il.policy.postures import POSTURE_DECODER, SCEPTICS
 from er_il.policy.results import save_cell
-from er_il.policy.training import Training, train_episodes
+from er_il.policy.training import PRECISION, Training, train_episodes
 from er_il.provenance import git_sha
 from er_il.schedule import FileResult, Job
 from er_il.spaces import from_spec
@@ -101,7 +102,7 @@ class Train:
                     code = training.run(file)
                 if code:
                     raise ErIlError(f"lerobot-train ended with exit code {code}.")
-        notes = json.dumps(_notes(cost))
+        notes = json.dumps(_notes(cost) | {"mixed_precision": os.environ.get(PRECISION, "no")})
         write_whole(self.notes, lambda path: path.write_text(notes))
 
 

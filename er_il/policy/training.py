@@ -25,6 +25,7 @@ STOCK = "lerobot-train"
 IN_MEMORY = "er_il.policy.in_memory"  # the same, in less time
 # With two threads on two cores, a step of these small policies takes ten times as long as with one.
 ONE_THREAD = {"OMP_NUM_THREADS": "1"}
+PRECISION = "ACCELERATE_MIXED_PRECISION"  # heeded by lerobot-train: bf16 is faster where the processor knows it
 _CHECKPOINTS, _LAST, _PRETRAINED = "checkpoints", "last", "pretrained_model"
 
 
