@@ -9,9 +9,9 @@ import numpy as np
 
 
 def write_whole(path: Path, write: Callable[[Path], object]) -> None:
-    """Let ``write`` write a file under another name, and give it its own once it is whole."""
+    """Let ``write`` write a file under another name of the same ending, and give it its own once it is whole."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(path.name + ".partial")
+    partial = path.with_stem(f"{path.stem}.partial")
     write(partial)
     partial.rename(path)
 
@@ -23,9 +23,4 @@ def write_json(path: Path, data: Mapping[str, Any]) -> None:
 
 def write_arrays(path: Path, arrays: Mapping[str, Any]) -> None:
     """Write arrays as a compressed ``.npz``."""
-
-    def write(partial: Path) -> None:
-        with partial.open("wb") as file:  # given a path, NumPy would change its ending
-            np.savez_compressed(file, allow_pickle=False, **arrays)
-
-    write_whole(path, write)
+    write_whole(path, lambda partial: np.savez_compressed(partial, allow_pickle=False, **arrays))

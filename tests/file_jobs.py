@@ -13,6 +13,7 @@ import gymnasium
 
 import sim_tasks  # noqa: F401  registers the tasks
 from er_il.schedule import FileResult
+from er_il.whole_file import write_whole
 
 
 @dataclass(frozen=True)
@@ -49,9 +50,7 @@ class FileJob(FileResult):
         result = simulated(self.seed)
         for need in self.needs:
             result += json.loads(need.path.read_text())
-        partial = self.path.with_suffix(".partial")
-        partial.write_text(json.dumps(result))
-        partial.rename(self.path)
+        write_whole(self.path, lambda path: path.write_text(json.dumps(result)))
 
 
 @dataclass

@@ -122,7 +122,7 @@ def test_the_report_counts(tmp_path: Path):
         ("9", "0", "timeout"),
         ("10", "1", ""),
     ]
-    assert not list((tmp_path / "new").glob("*.partial"))
+    assert not list((tmp_path / "new").glob("*.partial*"))
 
 
 def test_a_saved_cell_is_the_cell(tmp_path: Path):

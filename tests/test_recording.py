@@ -97,7 +97,7 @@ def test_same_seed_same_data_whatever_the_workers_and_the_first_space(generated,
         assert _table(again.paths[kind]).equals(_table(generated.paths[kind]))
         stats = [json.loads((each.paths[kind] / "meta/stats.json").read_text()) for each in (again, generated)]
         assert stats[0] == stats[1]
-    assert not list(tmp_path.glob("*.partial"))
+    assert not list(tmp_path.glob("*.partial*"))
 
 
 def test_a_space_can_be_added_later_and_another_recipe_is_refused(generated):

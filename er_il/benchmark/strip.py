@@ -1,6 +1,7 @@
 """Picture strips: one initial state of a task through several decoders, to see why a cell is what it is."""
 
 import shutil
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from er_il.schedule import FileResult, Job
 from er_il.showcase.pictures import Row, moments, write_strip
 from er_il.showcase.report import label_of
 from er_il.showcase.showing import telling_seed
+from er_il.whole_file import write_whole
 
 DECODERS = ("joint", "erj", "task-nearest", "task-posture")  # as far as the grid has them
 PICTURES = 5  # of a rollout
@@ -53,11 +55,12 @@ class Strip(FileResult):
             trace, pictures = record_rollout(trained.training.policy, trained.task, decoder, self.seed, FILM_EVERY)
             outcome = trace.outcome.replace("_", " ")
             rows.append(Row(label_of(decoder), outcome, trace.outcome == SUCCESS, moments(pictures, PICTURES)))
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        partial = self.path.with_suffix(".partial.png")
-        write_strip(rows, partial)
-        Image.open(partial).convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE).save(partial, optimize=True)
-        partial.rename(self.path)
+        write_whole(self.path, lambda path: _write(rows, path))
+
+
+def _write(rows: Sequence[Row], path: Path) -> None:
+    write_strip(rows, path)
+    Image.open(path).convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
 
 
 def strips(plan: Plan) -> dict[str, Strip]:

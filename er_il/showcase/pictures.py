@@ -9,6 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from er_il.whole_file import write_whole
+
 Picture = NDArray[np.uint8]  # (H, W, 3)
 
 INK = "#222222"
@@ -26,17 +28,18 @@ class Row:
 
 
 def write_film(pictures: Sequence[Picture], path: Path, rate: int) -> None:
-    """Write an mp4 (H.264) at ``rate`` pictures a second; no file is ever half-written."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_suffix(".partial.mp4")
+    """Write an mp4 (H.264) at ``rate`` pictures a second; the file is whole or absent."""
+    write_whole(path, lambda partial: _encode(pictures, partial, rate))
+
+
+def _encode(pictures: Sequence[Picture], path: Path, rate: int) -> None:
     height, width = pictures[0].shape[:2]
-    with av.open(str(partial), "w") as container:
+    with av.open(str(path), "w") as container:
         stream = container.add_stream("libx264", rate=rate, options={"crf": "23", "preset": "veryfast"})
         stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
         for picture in pictures:
             container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
         container.mux(stream.encode())
-    partial.rename(path)
 
 
 def moments(pictures: Sequence[Picture], count: int) -> list[Picture]:
