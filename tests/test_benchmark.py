@@ -27,6 +27,7 @@ from er_il.errors import ErIlError, UnknownNameError
 from er_il.policy.elbow import ElbowReference
 from er_il.policy.evaluation import Cell, Episode
 from er_il.policy.postures import grasp_posture, mean_posture
+from er_il.policy.training import PRECISION
 from er_il.schedule import Schedule
 
 PANDA = Arm.preset("panda")
@@ -208,6 +209,7 @@ def report(successes: int = 150) -> dict[str, Any]:
         "grid": Grid.from_dict(values | {"episodes": None}).to_dict(),
         "computed_by": ["0123abc"],
         "training_steps": {"joint": 1500},
+        "mixed_precision": ["bf16"],
         "rollout_seeds": "1000 to 1199",
         "costs": {"trainings": 3, "training_cpu_s": 3600, "rollouts": 800, "rollout_cpu_s": 1800},
         "missing": [],
@@ -224,7 +226,7 @@ def test_the_page_shows_what_was_counted(tmp_path: Path) -> None:
     assert row in compact_table(report()) and row in page
     assert (tmp_path / "table.md").read_text() in page + "\n"
     assert "| collision 197 |" in page and "-98.5 (" in page
-    for text in ("A title", "0123abc", "strip_reach_cup.png", "(table.png)", "1.0 h", "0.5 h"):
+    for text in ("A title", "0123abc", "strip_reach_cup.png", "(table.png)", "trainings: bf16", "1.0 h", "0.5 h"):
         assert text in page
     assert "200 rollouts a cell instead of 10" in page
     assert "It is not enough on: `reach_cup`" in page
@@ -283,6 +285,7 @@ def test_a_grid_from_end_to_end(
     before = written(out)
     grown = Plan(grid(sceptics=["task-grasp"], **short), out)
     grown.claim()
+    monkeypatch.setenv(PRECISION, "bf16")
     executor = InOrder()
     schedule = Schedule(grown.jobs)
     schedule.run(executor)
@@ -305,6 +308,7 @@ def test_a_grid_from_end_to_end(
         assert each["elbow_error"] == pytest.approx(np.mean([float(row["elbow_error"]) for row in own]), abs=1e-6)
     nearest, grasp = report["cells"][1:]
     assert nearest["elbow_error"] != grasp["elbow_error"]  # the posture reached the decoder
+    assert report["meta"]["mixed_precision"] == ["bf16", "no"]
     costs = report["meta"]["costs"]
     assert (costs["trainings"], costs["rollouts"]) == (2, 6) and min(
         costs["training_cpu_s"], costs["rollout_cpu_s"]
