@@ -15,7 +15,7 @@ from er_il.data.demos import Demo, make_world, record_demo
 from er_il.data.recipe import Recipe
 from er_il.data.record import Record
 from er_il.data.recording import generate
-from er_il.data.scales import LEAST_DEVIATION, MARGIN
+from er_il.data.scales import LEAST_DEVIATION, LEAST_ROTATION, MARGIN
 from er_il.data.schema import ACTION, DEMO_SEED, ENVIRONMENT_STATE, LEADER_JOINTS, STATE, action_spec
 from er_il.errors import DatasetError, UnknownNameError
 from er_il.spaces import from_spec
@@ -80,6 +80,17 @@ def test_scales_are_those_of_what_differs_between_episodes(generated, kind):
     deviation = np.maximum(state.std(axis=0), LEAST_DEVIATION)
     np.testing.assert_allclose(dataset.meta.stats[STATE]["std"], deviation, rtol=1e-3)
     assert np.any(state.std(axis=0) < LEAST_DEVIATION)
+
+
+def test_a_rotation_that_hardly_changes_does_not_outweigh_the_way_of_the_hand(generated):
+    for kind in ("joint", "erj"):
+        dataset = _load(generated.paths[kind])
+        recorded = np.stack(dataset.hf_dataset[ACTION]).std(axis=0)
+        expected = recorded.copy()
+        if kind == "erj":
+            assert np.any(recorded[3:7] < LEAST_ROTATION)
+            expected[3:7] = np.maximum(recorded[3:7], LEAST_ROTATION)
+        np.testing.assert_allclose(dataset.meta.stats[ACTION]["std"], expected, rtol=1e-3)
 
 
 def test_a_demo_seed_brings_its_world_back(generated):

@@ -24,7 +24,7 @@ from er_il.data.encoding import encode_dataset
 from er_il.data.layout import Layout
 from er_il.data.recipe import Recipe
 from er_il.data.record import Record
-from er_il.data.scales import set_scales
+from er_il.data.scales import loosen_rotations, set_scales
 from er_il.data.schema import ACTION, DEMO_SEED, ENVIRONMENT_STATE, IMAGES, LEADER_JOINTS, STATE, features
 from er_il.errors import DatasetError
 from er_il.spaces import ActionSpace, check_space, make_action_space
@@ -75,7 +75,8 @@ def generate(recipe: Recipe, spaces: Sequence[str], out: Path, progress: Progres
             _record(recipe, new[0], first, work, progress, workers)
         if missing := [space for space in new if out / space != first]:
             for space in progress.track(missing, description="Encode in the other spaces"):
-                encode_dataset(first, out / space, Layout.of_space(make_action_space(space, Arm.preset(recipe.arm))))
+                layout = Layout.of_space(make_action_space(space, Arm.preset(recipe.arm)))
+                encode_dataset(first, out / space, layout, finish=loosen_rotations)
         shutil.rmtree(work, ignore_errors=True)
     return Generated({space: out / space for space in asked}, new, Record.read(first).dropped)
 
@@ -152,6 +153,7 @@ class _Writer:
         info.splits = self._recipe.splits
         write_info(info, self._dataset.root)
         set_scales(self._dataset.root)
+        loosen_rotations(self._dataset.root)
         Record(self._recipe, dropped).write(self._dataset.root)
 
 
