@@ -7,7 +7,7 @@ from lerobot.datasets import write_stats
 from lerobot.datasets.io_utils import load_info, load_stats
 
 from er_il.data.rewriting import episode_slices, read_episode_numbers, read_vectors
-from er_il.data.schema import ACTION, ENVIRONMENT_STATE, STATE
+from er_il.data.schema import ACTION, ENVIRONMENT_STATE, STATE, dimension_names
 from er_il.rotation import Quaternion, Rot6d
 
 MARGIN = 0.025  # [m], or of a quaternion's component (2.9 degrees), around where objects start
@@ -48,6 +48,7 @@ def loosen_rotations(root: Path) -> None:
         root: Folder of the dataset; its episodes' own statistics stay what they were.
     """
     stats = load_stats(root) or {}
-    rotations = np.isin(load_info(root).features[ACTION]["names"], (*Quaternion.names, *Rot6d.names))
+    names = dimension_names(load_info(root).features[ACTION])
+    rotations = np.array([name.endswith((*Quaternion.names, *Rot6d.names)) for name in names])  # of any arm
     stats[ACTION] |= {"std": np.maximum(stats[ACTION]["std"], LEAST_ROTATION * rotations)}
     write_stats(stats, root)
