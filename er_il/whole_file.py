@@ -23,4 +23,9 @@ def write_json(path: Path, data: Mapping[str, Any]) -> None:
 
 def write_arrays(path: Path, arrays: Mapping[str, Any]) -> None:
     """Write arrays as a compressed ``.npz``."""
-    write_whole(path, lambda partial: np.savez_compressed(partial, allow_pickle=False, **arrays))
+
+    def write(partial: Path) -> None:
+        with partial.open("wb") as file:  # given a path, NumPy would add an ending where there is none
+            np.savez_compressed(file, allow_pickle=False, **arrays)
+
+    write_whole(path, write)
