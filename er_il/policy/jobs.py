@@ -27,7 +27,7 @@ from er_il.policy.training import PRECISION, Training, train_episodes
 from er_il.provenance import git_sha
 from er_il.schedule import FileResult, Job
 from er_il.spaces import from_spec
-from er_il.whole_file import write_whole
+from er_il.whole_file import write_json
 
 _LOGGED_STEP = re.compile(r"step:([\d.]+)(K?)")  # as lerobot-train logs it
 
@@ -102,8 +102,7 @@ class Train:
                     code = training.run(file)
                 if code:
                     raise ErIlError(f"lerobot-train ended with exit code {code}.")
-        notes = json.dumps(_notes(cost) | {"mixed_precision": os.environ.get(PRECISION, "no")})
-        write_whole(self.notes, lambda path: path.write_text(notes))
+        write_json(self.notes, _notes(cost) | {"mixed_precision": os.environ.get(PRECISION, "no")})
 
 
 @dataclass(frozen=True)
