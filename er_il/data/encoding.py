@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from er_il.data.decoding import DecodedEpisode, Episode, decode_episodes
 from er_il.data.layout import Layout
 from er_il.data.rewriting import Advance, Column, appearing, episode_slices, read_episode_numbers, read_vectors, rewrite
+from er_il.data.scales import loosen_rotations
 from er_il.data.schema import (
     ACTION,
     LEADER_JOINTS,
@@ -44,8 +45,8 @@ def encode_dataset(
 
     The joint vectors are those that were recorded, wherever the source holds them. Only the action
     column, its feature and its statistics differ, and they are what LeRobot would have written had
-    the dataset been recorded in that space. The source stays as it is; the target appears only when
-    complete.
+    the dataset been recorded in that space, but for :func:`er_il.data.scales.loosen_rotations`. The
+    source stays as it is; the target appears only when complete.
 
     Args:
         source: Folder of a LeRobot v3 dataset.
@@ -74,6 +75,7 @@ def encode_dataset(
         if keep and column == ACTION and layout.kind != JointSpace.kind:
             columns[SOURCE_ACTION] = Column(_kept(info.features[ACTION], layout), vectors)
         rewrite(source, partial, info, columns, advance)
+        loosen_rotations(partial)
         finish(partial)
 
 
@@ -103,6 +105,7 @@ def decode_dataset(
         decoded = decode_episodes(encoded_by, read_episodes(source, info, encoded_by), cores(), advance)
         vectors = np.concatenate([episode.vectors for episode in decoded]).astype(np.float32)
         rewrite(source, partial, info, {ACTION: _encoded(source, info, layout.fitted(vectors), vectors)})
+        loosen_rotations(partial)
         finish(partial)
     return decoded
 

@@ -10,7 +10,6 @@ from er_il.data import card
 from er_il.data.encoding import dataset_info, dataset_layout, decode_dataset, encode_dataset, joints_column
 from er_il.data.hub import find_dataset
 from er_il.data.layout import Layout
-from er_il.data.scales import loosen_rotations
 from er_il.data.schema import ACTION, SPEC
 from er_il.data.wiring import Wiring, wire
 from er_il.errors import DatasetError
@@ -74,7 +73,6 @@ def reencode(
         on_progress(done, total)
 
     def finish(partial: Path) -> None:
-        loosen_rotations(partial)
         written = dataset_info(partial)
         options: dict[str, Any] = {"to": kind, "rotation": rotation, "decoded": decode}
         name = folder.resolve().name if Path(source).exists() else source  # not where it lies on this machine
