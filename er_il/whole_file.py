@@ -9,10 +9,17 @@ import numpy as np
 
 
 def write_whole(path: Path, write: Callable[[Path], object]) -> None:
-    """Let ``write`` write a file under another name of the same ending, and give it its own once it is whole."""
+    """Let ``write`` write a file under another name of the same ending, and give it its own once it is whole.
+
+    Where it fails, as on a full disk, nothing is left of it.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_stem(f"{path.stem}.partial")
-    write(partial)
+    try:
+        write(partial)
+    except BaseException:
+        partial.unlink(missing_ok=True)
+        raise
     partial.rename(path)
 
 

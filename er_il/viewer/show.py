@@ -2,7 +2,7 @@
 
 import socket
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from urllib.parse import quote
 
@@ -14,6 +14,7 @@ from er_il.scene import Shape
 from er_il.trace import Trace
 from er_il.viewer.recording import log_episode, open_recording
 from er_il.viewer.source import shapes_of
+from er_il.whole_file import write_whole
 
 SUFFIX = ".rrd"  # by which Rerun knows its files
 GRPC_PORT, WEB_PORT = 9876, 9090  # Rerun's own
@@ -35,14 +36,9 @@ def save_recording(trace: Trace, shapes: Sequence[Shape], path: Path) -> None:
     recording = open_recording(trace)
     memory = recording.memory_recording()  # Rerun's own way to a file waits for ever if the disk is full
     log_episode(recording, trace, shapes)
-    partial = path.with_name(path.name + ".partial")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        partial.write_bytes(memory.drain_as_bytes())
-        partial.rename(path)
+        write_whole(path, lambda partial: partial.write_bytes(memory.drain_as_bytes()))
     except OSError as error:
-        with suppress(OSError):
-            partial.unlink(missing_ok=True)
         raise ErIlError(f"Cannot write {path}: {error.strerror}.") from error
 
 
