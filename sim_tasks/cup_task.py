@@ -44,6 +44,7 @@ class CupTask(ArmTask):
         *,
         cup_range: tuple[float, float] = (0.03, 0.03),
         via_range: float = 0.01,
+        sway_range: float = 0.0,
         speed_range: tuple[float, float] = (0.45, 0.55),
         **kwargs: Any,
     ) -> None:
@@ -52,11 +53,13 @@ class CupTask(ArmTask):
         Args:
             cup_range: Sides [m] of the rectangle in which the cup stands.
             via_range: The leader's hand turns towards the cup up to this far [m] from the nominal place.
+            sway_range: It passes the places between there and the grasp up to this far [m] beside them.
             speed_range: The leader's share of the joints' velocity limits.
             kwargs: See :class:`ArmTask`.
         """
         self._cup_range = cup_range
         self._via_range = via_range
+        self._sway_range = sway_range
         self._speed_range = speed_range
         super().__init__(**kwargs)
         self._cup_body = {self._model.body(CUP).id}
@@ -104,11 +107,12 @@ class CupTask(ArmTask):
     def _script(self, rng: np.random.Generator) -> tuple[Sequence[Stretch], float]:
         x, y = self.object_pose(CUP)[:2]
         grasp = np.array([x, y, self.standing + GRASP_HEIGHT])
-        turn = rng.uniform(-self._via_range, self._via_range, 3)
+        off = np.zeros((len(self.way), 3))  # [m] from the nominal places
+        off[0] = rng.uniform(-self._via_range, self._via_range, 3)
+        (sway,) = rng.spawn(1)  # numbers of its own: the same seed drew where the cup stands
+        off[1:-1, 1] = sway.uniform(-self._sway_range, self._sway_range, len(off) - 2)
         there = [
-            Keyframe(
-                hand_pose(grasp + offset + (turn if i == 0 else 0.0), PITCH), elbow, straight=i > 0, lean=self.lean
-            )
+            Keyframe(hand_pose(grasp + offset + off[i], PITCH), elbow, straight=i > 0, lean=self.lean)
             for i, (offset, elbow) in enumerate(self.way)
         ]
         back = [
