@@ -1,6 +1,7 @@
 """The worlds: contract with Gymnasium, physics, demonstrations, judgement."""
 
 from collections.abc import Iterator
+from contextlib import suppress
 
 import gymnasium
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import sim_tasks
-from er_il.errors import ErIlError, UnknownNameError
+from er_il.errors import ErIlError, PlanError, UnknownNameError
 from er_il.kinematics import kinematics_of
 from sim_tasks.arm_task import ArmTask
 
@@ -141,3 +142,26 @@ def test_wrong_names_list_the_valid_ones() -> None:
         gymnasium.make(IDS[0]).reset(options={"state": {"mug": (0, 0, 0)}})
     with pytest.raises(ErIlError, match="Image size 0"):
         gymnasium.make(IDS[0], cameras=("wrist",), image_size=0)
+
+
+def test_a_swaying_hand_does_not_tell_where_the_cup_stands() -> None:
+    def sideways(world: ArmTask, seed: int) -> tuple[float, float, float]:
+        """The cup's y, and the hand's off it: 10 cm before the grasp, and at it."""
+        world.reset(seed=seed)
+        x, y = world.object_pose("cup")[:2]
+        hands = [kinematics_of(world.arm).fk(action[:-1])[:2, 3] for action in world.leader(seed) if action[-1] > 0.5]
+        before = next(hand for hand in hands if hand[0] > x - 0.10)
+        return y, before[1] - y, hands[-1][1] - y
+
+    straight = np.array([sideways(make("sim_tasks/ReachCup-v0")[1], seed) for seed in range(3)])
+    world, measured = make("sim_tasks/ReachCup-v0", sway_range=0.02)[1], []
+    for seed in range(18):
+        with suppress(PlanError):  # the cabinet is narrow
+            measured.append(sideways(world, seed))
+    swaying = np.array(measured)
+    assert len(swaying) > 14
+    assert np.abs(straight[:, 1:]).max() < 0.003
+    assert np.abs(swaying[:, 1]).max() > 0.012
+    assert swaying[:, 1].std() > 0.006
+    assert abs(np.corrcoef(swaying[:, 0], swaying[:, 1])[0, 1]) < 0.6
+    assert np.abs(swaying[:, 2]).max() < 0.003
