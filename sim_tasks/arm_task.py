@@ -27,6 +27,8 @@ RATE = 20  # [Hz] of control
 COLLISION_FORCE = 20.0  # [N] at which a Panda's collision reflex stops it, by its makers' default
 SUCCESS_STEPS = 5  # consecutive control steps (0.25 s) for which success must hold
 
+_LEADER = 2  # tells the leader's random numbers from the world's, which start from the seed itself
+
 Placement = dict[str, tuple[float, float, float]]  # object: x, y [m], yaw [rad]
 
 
@@ -220,7 +222,7 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
         Raises:
             er_il.errors.PlanError: no collision-free motion exists; known before the first yield.
         """
-        script, speed = self._script(np.random.default_rng(seed))
+        script, speed = self._script(np.random.default_rng([seed, _LEADER]))
         return self._leader_arm.perform(self.joint_positions, script, speed)
 
     @cached_property

@@ -109,8 +109,7 @@ class CupTask(ArmTask):
         grasp = np.array([x, y, self.standing + GRASP_HEIGHT])
         off = np.zeros((len(self.way), 3))  # [m] from the nominal places
         off[0] = rng.uniform(-self._via_range, self._via_range, 3)
-        (sway,) = rng.spawn(1)  # numbers of its own: the same seed drew where the cup stands
-        off[1:-1, 1] = sway.uniform(-self._sway_range, self._sway_range, len(off) - 2)
+        off[1:-1, 1] = rng.uniform(-self._sway_range, self._sway_range, len(off) - 2)
         there = [
             Keyframe(hand_pose(grasp + offset + off[i], PITCH), elbow, straight=i > 0, lean=self.lean)
             for i, (offset, elbow) in enumerate(self.way)

@@ -23,7 +23,7 @@ Floats = NDArray[np.float32]
 HOPELESS = 10  # give up once this many more demos have failed than succeeded
 
 _IMAGES = "images/"
-_PUSHES = 1  # tells the stream of random pushes from the world's and the leader's, which start from the seed itself
+_PUSHES = 1  # tells the random pushes from the numbers of the world (the seed itself) and of the leader (2)
 
 
 @dataclass(frozen=True, eq=False)
