@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,10 @@ TABLE, PAGE = "table.md", "README.md"
 BARS, CURVES = "table.png", "curves.png"
 STRIPS = "strip_*.png"  # one a task
 
-TASK_DECODERS = {"task-nearest", "task-posture"}
+RULES = {
+    "task-nearest": "the solution nearest to the present joints",
+    "task-posture": "pulled to a comfortable posture",
+}
 MARGIN = 0.05  # a decoder does as well as the reference if its paired difference is, at 95 %, above minus this
 
 Report = Mapping[str, Any]
@@ -25,7 +29,7 @@ def write_pages(folder: Path) -> None:
     report = json.loads((folder / RESULTS).read_text())
     if not report["cells"]:
         return
-    if len(report["meta"]["grid"]["demonstrations"]) > 1:
+    if _varied(report):
         figure = CURVES
         write_curves(report["cells"], folder / figure)
     else:
@@ -52,6 +56,11 @@ def _page(report: Report, figure: str, strips: list[str]) -> list[str]:
     return [paragraph for paragraph in page if paragraph]
 
 
+def _varied(report: Report) -> bool:
+    """Whether the number of demonstrations varies."""
+    return len(report["meta"]["grid"]["demonstrations"]) > 1
+
+
 def _compared(report: Report) -> bool:
     """Whether the paper did the like: any of the tasks, with a Panda's seven joints."""
     grid = report["meta"]["grid"]
@@ -74,19 +83,20 @@ def _differences(report: Report) -> str:
     meta, grid = report["meta"], report["meta"]["grid"]
     episodes = report["cells"][0]["episodes"]
     steps = sorted(set(meta["training_steps"].values()))
-    marks = [paper.share(task, name) is not None for task in grid["tasks"] for name in grid["decoders"]]
+    marked = not _varied(report) and any(
+        paper.share(*each) is not None for each in product(grid["tasks"], grid["decoders"])
+    )
     own = [task for task in grid["tasks"] if task not in paper.SUCCESSES]
     lines = [
         "Simulation: a Panda in MuJoCo, led by a scripted arm; the paper has two real ones, and a person who leads.",
         f"{_sight(grid)} They are small, trained for {' to '.join(map(str, steps))} steps on a CPU.",
         f"{episodes} rollouts a cell instead of {paper.ROLLOUTS}"
-        + ("; the diamonds are the paper's figures." if any(marks) else "."),
+        + ("; the diamonds are the paper's figures." if marked else "."),
     ]
-    if TASK_DECODERS & set(grid["decoders"]):
+    if rules := [f"`{name}`: {rule}" for name, rule in RULES.items() if name in grid["decoders"]]:
         lines.append(
-            "Task space is decoded by each of two rules (`task-nearest`: the solution nearest to the present joints; "
-            "`task-posture`: pulled to a comfortable posture), where the paper uses one solver, pick_ik. Its diamond "
-            "stands beside `task-nearest`."
+            f"Task space is decoded by {'one rule' if len(rules) == 1 else 'each of two rules'} ({'; '.join(rules)}), "
+            f"where the paper uses one solver, pick_ik.{' Its diamond stands beside `task-nearest`.' if marked else ''}"
         )
     lines.append("Furniture, objects and their places follow the paper's description and pictures, not its measures.")
     if "era" in grid["decoders"]:
