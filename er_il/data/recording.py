@@ -75,8 +75,7 @@ def generate(recipe: Recipe, spaces: Sequence[str], out: Path, progress: Progres
             _record(recipe, new[0], first, work, progress, workers)
         if missing := [space for space in new if out / space != first]:
             for space in progress.track(missing, description="Encode in the other spaces"):
-                layout = Layout.of_space(make_action_space(space, Arm.preset(recipe.arm)))
-                encode_dataset(first, out / space, layout)
+                encode_dataset(first, out / space, Layout.of_space(make_action_space(space, Arm.preset(recipe.arm))))
         shutil.rmtree(work, ignore_errors=True)
     return Generated({space: out / space for space in asked}, new, Record.read(first).dropped)
 
