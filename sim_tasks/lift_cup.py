@@ -3,6 +3,7 @@
 import mujoco
 
 from sim_tasks.cup_task import CUP, CupTask
+from sim_tasks.grip import firm_grip
 from sim_tasks.props import Stand
 
 
@@ -21,7 +22,7 @@ class LiftCup(CupTask):
     way = (
         ((-0.20, 0.0, 0.04), None),
         ((-0.10, 0.0, 0.01), None),
-        ((0.0, 0.0, 0.0), None),
+        ((0.003, 0.0, 0.0), None),  # the stem in the middle of the finger pads
     )
     way_back = (((-0.03, 0.0, 0.025), None),)  # lifted
     lean = 0.2
@@ -29,3 +30,4 @@ class LiftCup(CupTask):
     def _build(self, spec: mujoco.MjSpec) -> None:
         self.stand.raised(self.lift).add(spec, "stand", "wood")
         self.cup.add(spec, CUP, (*self.centre, self.standing), "copper")
+        firm_grip(spec)

@@ -14,6 +14,6 @@ class ReachCup(CabinetCup):
         ((-0.34, 0.0, 0.04), 1.2),  # down before the opening, the elbow out, clear of the wall
         ((-0.24, 0.0, 0.02), 1.15),
         ((-0.10, 0.0, 0.01), 0.1),  # the elbow comes up while the forearm is still outside
-        ((0.0, 0.0, 0.0), 0.1),
+        ((0.003, 0.0, 0.0), 0.1),  # the stem in the middle of the finger pads
     )
     way_back = (((-0.03, 0.0, 0.025), 0.1),)  # lifted

@@ -12,7 +12,7 @@ class ReachRemoveCup(RemoveCup):
     max_steps = 300
     arms = ("panda",)
     start = ReachCup.start
-    way = (*ReachCup.way[:-1], RemoveCup.way[-1])
+    way = ReachCup.way
     pace = ReachCup.pace
 
     def _collision(self) -> str:

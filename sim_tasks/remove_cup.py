@@ -1,9 +1,6 @@
 """Remove Cup: the arm is inside the cabinet; take the cup by its stem and bring it out upright (paper V-B)."""
 
-import mujoco
-
 from sim_tasks.cabinet_cup import CabinetCup
-from sim_tasks.grip import firm_grip
 
 
 class RemoveCup(CabinetCup):
@@ -25,10 +22,6 @@ class RemoveCup(CabinetCup):
         ((-0.24, 0.0, 0.03), 1.15),  # the elbow swings out before it leans back into the wall
         ((-0.39, 0.0, 0.04), 1.3),  # farther than success asks, so that a policy passes its border
     )
-
-    def _build(self, spec: mujoco.MjSpec) -> None:
-        super()._build(spec)
-        firm_grip(spec)
 
     def _succeeds(self) -> bool:
         return super()._succeeds() and self._outside()
