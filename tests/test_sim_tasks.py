@@ -12,6 +12,7 @@ import sim_tasks
 from er_il.errors import ErIlError, PlanError, UnknownNameError
 from er_il.kinematics import kinematics_of
 from sim_tasks.arm_task import ArmTask
+from sim_tasks.cup_task import CupTask
 
 IDS = [f"sim_tasks/{task.__name__}-v0" for task in sim_tasks.TASKS]
 DEMOS = 6  # a task; the benchmark of 100 is a command (README)
@@ -123,6 +124,20 @@ def test_a_hand_that_never_closes_times_out_and_one_that_closes_beside_misses() 
     env.reset(seed=0)
     fist = np.append(world.joint_positions, 0.0)
     assert play(env, iter([fist] * 1000))["failure"] == "missed_grasp"
+
+
+@pytest.mark.parametrize("task", [task for task in sim_tasks.TASKS if issubclass(task, CupTask)])
+def test_a_cup_does_not_creep_out_of_the_fingers_that_hold_it(task: type[CupTask]) -> None:
+    world = task()
+    world.reset(seed=0)
+    actions = list(world.leader(0))
+    for action in actions:
+        world.step(action)
+    height = world.object_pose("cup")[2]
+    for _ in range(60):  # 3 s
+        world.step(actions[-1])
+    assert world._held()
+    assert abs(world.object_pose("cup")[2] - height) < 0.0005
 
 
 def test_objects_can_be_placed_and_quaternions_do_not_jump() -> None:
