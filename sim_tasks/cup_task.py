@@ -20,7 +20,7 @@ FREED = 0.01  # [m] of the foot above the surface
 TIPPED = np.cos(np.radians(25))  # cosine of the tilt from which a stemmed cup falls
 CLOSED = 0.5  # opening below which the gripper counts as closed
 CLEARANCE = 0.008  # [m] the leader keeps from the furniture
-GRASP_TIME = 0.5  # [s] for the fingers to close
+GRASP_TIME = 0.5  # [s] that the hand stays once the fingers are told to be closed
 REST = 0.5  # [s] at the end, beyond the moment of success: a policy must not learn to stop short of it
 
 # Offset [m] of the hand from the grasp, and base joint [rad] that puts the elbow there (or any).
@@ -46,6 +46,7 @@ class CupTask(ArmTask):
         via_range: float = 0.01,
         sway_range: float = 0.0,
         speed_range: tuple[float, float] = (0.45, 0.55),
+        closing_range: tuple[float, float] = (0.2, 0.6),
         **kwargs: Any,
     ) -> None:
         """Build the task.
@@ -55,12 +56,14 @@ class CupTask(ArmTask):
             via_range: The leader's hand turns towards the cup up to this far [m] from the nominal place.
             sway_range: It passes the places between there and the grasp up to this far [m] beside them.
             speed_range: The leader's share of the joints' velocity limits.
+            closing_range: Its fingers take so long [s] to close.
             kwargs: See :class:`ArmTask`.
         """
         self._cup_range = cup_range
         self._via_range = via_range
         self._sway_range = sway_range
         self._speed_range = speed_range
+        self._closing_range = closing_range
         super().__init__(**kwargs)
         self._cup_body = {self._model.body(CUP).id}
         self._was_freed = False
@@ -121,9 +124,10 @@ class CupTask(ArmTask):
         is_free = self._collisions.is_free
         reach = plan_stretch(self.arm, self.joint_positions, there, is_free)
         leave = plan_stretch(self.arm, reach[-1], back, is_free)
+        speed, closing = rng.uniform(*self._speed_range), rng.uniform(*self._closing_range)
         script = [
             Stretch(reach, gripper=1.0, pace=self.pace),
-            Stretch(reach[-1:], gripper=0.0, hold=GRASP_TIME),
+            Stretch(reach[-1:], gripper=0.0, closing=closing, hold=closing + GRASP_TIME),
             Stretch(leave, gripper=0.0, hold=REST),
         ]
-        return script, rng.uniform(*self._speed_range)
+        return script, speed

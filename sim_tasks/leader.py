@@ -31,9 +31,12 @@ class Leader:
         data = mujoco.MjData(self._model)
         self._robot.place(data, start, script[0].gripper)
         mujoco.mj_forward(self._model, data)
+        before = script[0].gripper
         for stretch in script:
-            for target in stretch.sample(self._arm, self._period, speed):
-                self._robot.command(data, target, stretch.gripper)
+            targets = stretch.sample(self._arm, self._period, speed)
+            for target, opening in zip(targets, stretch.openings(before, self._period, len(targets)), strict=True):
+                self._robot.command(data, target, opening)
                 mujoco.mj_step(self._model, data, nstep=self._substeps)
-                # A person's trigger closes at once; what the fingers hold is the follower's to find out.
-                yield np.append(data.qpos[self._robot.joint_qpos], stretch.gripper)
+                # The trigger's opening, not the fingers': what they hold is the follower's to find out.
+                yield np.append(data.qpos[self._robot.joint_qpos], opening)
+            before = stretch.gripper

@@ -30,12 +30,20 @@ class Keyframe:
 
 @dataclass(frozen=True)
 class Stretch:
-    """A motion between two stops, the gripper still."""
+    """A motion between two stops, or the gripper's at one."""
 
     waypoints: np.ndarray  # (K, n) [rad]
     gripper: float  # opening in [0, 1]
+    closing: float = 0.0  # [s] that the gripper takes to get there from where it was
     hold: float = 0.0  # [s] rest at the end, for the gripper to act
     pace: float = 1.0  # share of the script's speed
+
+    def openings(self, before: float, period: float, steps: int) -> np.ndarray:
+        """Openings (steps,) of the gripper every ``period`` seconds, from the opening ``before`` the stretch."""
+        if not self.closing:
+            return np.full(steps, self.gripper)
+        times = np.arange(1, steps + 1) * period
+        return np.interp(times, (0.0, self.closing), (before, self.gripper))
 
     def sample(self, arm: Arm, period: float, speed: float) -> np.ndarray:
         """Joint angles (T, n) every ``period`` seconds at a share ``speed`` of the velocity limits."""
