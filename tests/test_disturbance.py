@@ -21,11 +21,11 @@ def test_pushes_have_the_deviation_and_last_for_a_while():
     assert np.abs(np.corrcoef(drawn.T) - np.eye(7)).max() < 0.2  # each joint its own
 
 
-def test_all_is_calm_while_the_gripper_moves():
-    gripper = np.where(np.arange(8000) > CLOSES, 0.0, 1.0)
-    drawn = pushes(0, gripper)
+@pytest.mark.parametrize("takes", [PERIOD, 1.0])  # [s]
+def test_all_is_calm_while_the_gripper_moves(takes):
     time = PERIOD * (np.arange(8000) - CLOSES)
-    calm = (time > -CALM_BEFORE + 1e-9) & (time < CALM_AFTER - 1e-9)
+    drawn = pushes(0, np.clip(1 - time / takes, 0.0, 1.0))
+    calm = (time > -CALM_BEFORE + 1e-9) & (time < takes - PERIOD + CALM_AFTER - 1e-9)
     assert np.all(drawn[calm] == 0)
     assert np.all(np.any(drawn[~calm & (np.abs(time) > 2)] != 0, axis=1))
 

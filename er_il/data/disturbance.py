@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 CORRELATION = 0.3  # [s] for which a push lasts
 CALM_BEFORE, CALM_AFTER = 0.2, 1.0  # [s] around a movement of the gripper: a push would tip what it grasps
 FADE = 0.5  # [s] in which pushes die down, and come back
-MOVES = 0.1  # change of the gripper's opening in a step that is a movement
+MOVES = 0.01  # change of the gripper's opening in a step that is a movement
 
 Floats = NDArray[np.float64]
 
