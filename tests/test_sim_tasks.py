@@ -140,6 +140,21 @@ def test_a_cup_does_not_creep_out_of_the_fingers_that_hold_it(task: type[CupTask
     assert abs(world.object_pose("cup")[2] - height) < 0.0005
 
 
+def test_a_leader_closes_on_a_cup_over_a_while_with_its_hand_still() -> None:
+    _, world = make("sim_tasks/LiftCup-v0")
+    durations = []
+    for seed in range(6):
+        world.reset(seed=seed)
+        actions = np.array(list(world.leader(seed)))
+        opening, turned = actions[:, -1], np.abs(np.diff(actions[:, :-1], axis=0)).max(axis=1)
+        closing = np.flatnonzero(np.diff(opening))
+        assert np.all(np.diff(opening) <= 0)
+        assert opening[0] == 1 and opening[-1] == 0
+        assert np.all(turned[closing[0] : closing[-1] + 10] < 0.002)  # [rad]
+        durations.append(len(closing) / world.metadata["render_fps"])
+    assert 0.2 <= min(durations) < max(durations) <= 0.6 + 0.05
+
+
 def test_objects_can_be_placed_and_quaternions_do_not_jump() -> None:
     env, world = make("sim_tasks/LiftCup-v0")
     observation, _ = env.reset(seed=0, options={"state": {"cup": (0.60, 0.01, 0.5)}})
