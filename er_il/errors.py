@@ -37,6 +37,10 @@ class SpecError(ErIlError):
     """An action specification that is unreadable or does not match."""
 
 
+class RandomisationError(ErIlError, ValueError):
+    """A range of a task's randomisation that is none."""
+
+
 class DatasetError(ErIlError):
     """A dataset that is missing, unreadable or not what the command needs."""
 

@@ -20,6 +20,7 @@ from sim_tasks.contact import contact_force
 from sim_tasks.geometry import world_shapes
 from sim_tasks.leader import Leader
 from sim_tasks.motion import Stretch
+from sim_tasks.randomisation import span
 from sim_tasks.robot import FINGER_BODIES, RobotModel, lift
 from sim_tasks.scene import scene_spec
 
@@ -78,7 +79,7 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
         # Tasks are measured from a Panda's shoulder: what stands before an arm that is taller stands higher, too.
         self.lift = lift(self.arm)
         self.render_mode = render_mode
-        self._start_range = start_range
+        self._start_range = span("start_range", start_range)
         self._model = self._spec().compile()
         self._data = mujoco.MjData(self._model)
         self._robot = RobotModel.of(self._model, self.arm)

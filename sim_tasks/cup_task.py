@@ -12,6 +12,7 @@ from sim_tasks.contact import touching
 from sim_tasks.hand import hand_pose
 from sim_tasks.motion import Keyframe, Stretch, plan_stretch
 from sim_tasks.props import Goblet
+from sim_tasks.randomisation import SLOWEST, interval, sides, span
 
 CUP = "cup"
 GRASP_HEIGHT = 0.09  # [m] of the fingertips above the surface the cup stands on, at mid-stem
@@ -59,11 +60,11 @@ class CupTask(ArmTask):
             closing_range: Its fingers take so long [s] to close.
             kwargs: See :class:`ArmTask`.
         """
-        self._cup_range = cup_range
-        self._via_range = via_range
-        self._sway_range = sway_range
-        self._speed_range = speed_range
-        self._closing_range = closing_range
+        self._cup_range = sides("cup_range", cup_range)
+        self._via_range = span("via_range", via_range)
+        self._sway_range = span("sway_range", sway_range)
+        self._speed_range = interval("speed_range", speed_range, least=SLOWEST)
+        self._closing_range = interval("closing_range", closing_range)
         super().__init__(**kwargs)
         self._cup_body = {self._model.body(CUP).id}
         self._was_freed = False

@@ -18,6 +18,7 @@ from sim_tasks.arm_task import ArmTask, Placement
 from sim_tasks.contact import touching
 from sim_tasks.motion import Keyframe, Stretch, plan_stretch
 from sim_tasks.props import PushButton
+from sim_tasks.randomisation import SLOWEST, interval, sides, span
 
 BUTTON, PEDESTAL = "button", "pedestal"
 ELBOW = ("panda_link2", "panda_link3", "panda_link4", "panda_link5")  # upper arm to forearm: no other link may press
@@ -61,9 +62,9 @@ class PushButtonElbow(ArmTask):
             speed_range: The leader's share of the joints' velocity limits.
             kwargs: See :class:`ArmTask`.
         """
-        self._button_range = button_range
-        self._via_range = via_range
-        self._speed_range = speed_range
+        self._button_range = sides("button_range", button_range)
+        self._via_range = span("via_range", via_range)
+        self._speed_range = interval("speed_range", speed_range, least=SLOWEST)
         super().__init__(**kwargs)
         self._cap = {self._model.body(BUTTON).id}
         self._elbow = {self._model.body(name).id for name in ELBOW}

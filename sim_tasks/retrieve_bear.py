@@ -21,6 +21,7 @@ from sim_tasks.hand import hand_pose
 from sim_tasks.household import BEAR, BOOKS, CACTUS, HEAD_HEIGHT, LAMP, VASE, Sideboard, Thing
 from sim_tasks.motion import Keyframe, Stretch, plan_stretch
 from sim_tasks.props import Wall
+from sim_tasks.randomisation import SLOWEST, interval, sides, span
 
 GAP = 0.36  # x [m] at which the leader's hand comes through between vase and cactus, always at y = 0
 PITCH = np.radians(45)  # of the hand below the horizontal
@@ -80,11 +81,11 @@ class RetrieveBear(ArmTask):
             speed_range: The leader's share of the joints' velocity limits.
             kwargs: See :class:`ArmTask`.
         """
-        self._bear_range = bear_range
-        self._clutter_range = clutter_range
-        self._clutter_yaw_range = clutter_yaw_range
-        self._via_range = via_range
-        self._speed_range = speed_range
+        self._bear_range = sides("bear_range", bear_range)
+        self._clutter_range = sides("clutter_range", clutter_range)
+        self._clutter_yaw_range = span("clutter_yaw_range", clutter_yaw_range)
+        self._via_range = span("via_range", via_range)
+        self._speed_range = interval("speed_range", speed_range, least=SLOWEST)
         super().__init__(**kwargs)
         self._bear_body = {self._model.body("bear").id}
         self._was_freed = False

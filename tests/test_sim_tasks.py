@@ -9,7 +9,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import sim_tasks
-from er_il.errors import ErIlError, PlanError, UnknownNameError
+from er_il.errors import ErIlError, PlanError, RandomisationError, UnknownNameError
 from er_il.kinematics import kinematics_of
 from sim_tasks.arm_task import ArmTask
 from sim_tasks.cup_task import CupTask
@@ -172,6 +172,23 @@ def test_wrong_names_list_the_valid_ones() -> None:
         gymnasium.make(IDS[0]).reset(options={"state": {"mug": (0, 0, 0)}})
     with pytest.raises(ErIlError, match="Image size 0"):
         gymnasium.make(IDS[0], cameras=("wrist",), image_size=0)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"cup_range": 0.03}, "cup_range must be two numbers"),
+        ({"cup_range": (0.03, -0.03)}, r"cup_range .* not \(0.03, -0.03\)"),
+        ({"via_range": (0.0, 0.01)}, "via_range must be a number"),
+        ({"start_range": "wide"}, "start_range must be a number of at least 0, not 'wide'"),
+        ({"speed_range": (0.0, 0.5)}, "speed_range must be the lowest and the highest number, at least 0.01"),
+        ({"closing_range": (0.6, 0.2)}, "closing_range must be the lowest and the highest"),
+        ({"closing_range": (0.2, float("nan"))}, "closing_range"),
+    ],
+)
+def test_wrong_randomisation_is_refused_by_name(wrong: dict[str, object], message: str) -> None:
+    with pytest.raises(RandomisationError, match=message):
+        gymnasium.make("sim_tasks/LiftCup-v0", **wrong)
 
 
 def test_a_swaying_hand_does_not_tell_where_the_cup_stands() -> None:
