@@ -61,7 +61,8 @@ def make_world(recipe: Recipe) -> gymnasium.Env[Any, Any]:
 
     Raises:
         UnknownNameError: there is no such task, arm or camera.
-        DatasetError: the environment refuses the recipe's randomisation, or cannot render.
+        RandomisationError: a range of the recipe is none.
+        DatasetError: the environment does not take the recipe's randomisation, or cannot render.
     """
     try:
         return gymnasium.make(task_id(recipe.task), **recipe.environment)
