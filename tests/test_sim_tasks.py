@@ -104,9 +104,10 @@ def test_the_elbow_cannot_stay_up_or_out() -> None:
 def test_hitting_the_cabinet_is_a_collision_and_tipping_the_cup_knocks_it_over() -> None:
     env, world = make("sim_tasks/ReachCup-v0")
     env.reset(seed=0)
-    into_the_front = np.append(world.joint_positions, 1.0)
-    into_the_front[1] += 1.2
-    assert play(env, iter([into_the_front] * 60))["failure"] == "collision"
+    inside = [action for action in world.leader(0) if action[-1] == 1.0][:-20]  # before the cup
+    assert play(env, iter(inside))["failure"] == ""
+    into_the_side = inside[-1] + np.eye(8)[0] * 0.5
+    assert play(env, iter([into_the_side] * 60))["failure"] == "collision"
 
     env, world = make("sim_tasks/LiftCup-v0")
     env.reset(seed=0)
