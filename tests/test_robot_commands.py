@@ -99,7 +99,7 @@ def test_stock_record_gives_a_dataset_of_the_scripts_in_degrees(recorded: Path):
         action, state = columns[:][ACTION][rows], columns[:]["observation.state"][rows]
         expected = in_degrees(script(SEED + episode))  # another world each episode, from its beginning
         steps = min(len(action), len(expected))
-        assert steps > 40
+        assert steps > 20  # in two seconds, however busy the machine
         np.testing.assert_allclose(action[:steps], expected[:steps], atol=1e-4)
         np.testing.assert_allclose(state[1:steps, :7], action[: steps - 1, :7], atol=3.0)  # servos lag
     assert dataset[0]["observation.images.wrist"].std() > 0.01
@@ -114,10 +114,17 @@ def test_an_erj_policy_drives_the_robot_to_the_cup_through_the_stock_rollout(
     spec = encoded.features[ACTION]["info"]["er_il"]
     actions = Layout.from_spec(spec).encode(in_degrees(script(SEED)))
     said = iter(torch.from_numpy(actions.astype(np.float32)))
-    last = torch.from_numpy(actions[-1:].astype(np.float32))
-    monkeypatch.setattr(ACTPolicy, "select_action", lambda self, batch: next(said, last[0])[None])
-    run(lerobot_rollout.main, f"--policy.path={attached}", *ROBOT, "--fps=100", "--duration=4", "--task=Reach the cup.",
-        "--return_to_initial_position=false")  # fmt: skip
+
+    def say(policy: ACTPolicy, batch: object) -> torch.Tensor:
+        """What comes next; the operator interrupts after it, however fast this machine is."""
+        action = next(said, None)
+        if action is None:
+            raise KeyboardInterrupt
+        return action[None]
+
+    monkeypatch.setattr(ACTPolicy, "select_action", say)
+    run(lerobot_rollout.main, f"--policy.path={attached}", *ROBOT, "--fps=100", "--duration=120",
+        "--task=Reach the cup.", "--return_to_initial_position=false")  # fmt: skip
     assert "Simulated episode 0: success" in capfd.readouterr().err
 
 
