@@ -11,7 +11,6 @@ import mujoco
 import numpy as np
 
 from sim_tasks.cup_task import CUP, CupTask
-from sim_tasks.grip import firm_grip
 from sim_tasks.props import Cabinet, Wall
 
 OUTSIDE = 0.02  # [m] between the cabinet's front and the whole of a cup that is out
@@ -29,8 +28,7 @@ class CabinetCup(CupTask):
     def _build(self, spec: mujoco.MjSpec) -> None:
         self.cabinet.raised(self.lift).add(spec, "cabinet", "wood", inside="dark_wood", sides="glass")
         Wall().raised(self.lift).add(spec, "wall", "plaster")
-        self.cup.add(spec, CUP, (*self.centre, self.standing), "copper")
-        firm_grip(spec)
+        super()._build(spec)
 
     def _outside(self) -> bool:
         """Whether foot and bowl are both before the cabinet."""

@@ -4,11 +4,13 @@ from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
+import mujoco
 import numpy as np
 
 from sim_tasks.arm_task import ArmTask, Placement
 from sim_tasks.collision import Collisions
 from sim_tasks.contact import touching
+from sim_tasks.grip import firm_grip
 from sim_tasks.hand import hand_pose
 from sim_tasks.motion import Keyframe, Stretch, plan_stretch
 from sim_tasks.props import Goblet
@@ -73,6 +75,10 @@ class CupTask(ArmTask):
     def standing(self) -> float:
         """z [m] of the foot of the cup as it stands before this arm."""
         return self.surface + self.lift
+
+    def _build(self, spec: mujoco.MjSpec) -> None:
+        self.cup.add(spec, CUP, (*self.centre, self.standing), "copper")
+        firm_grip(spec)
 
     def _draw(self, rng: np.random.Generator) -> Placement:
         x, y = np.array(self.centre) + (rng.random(2) - 0.5) * self._cup_range

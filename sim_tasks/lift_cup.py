@@ -2,8 +2,7 @@
 
 import mujoco
 
-from sim_tasks.cup_task import CUP, CupTask
-from sim_tasks.grip import firm_grip
+from sim_tasks.cup_task import CupTask
 from sim_tasks.props import Stand
 
 
@@ -29,5 +28,4 @@ class LiftCup(CupTask):
 
     def _build(self, spec: mujoco.MjSpec) -> None:
         self.stand.raised(self.lift).add(spec, "stand", "wood")
-        self.cup.add(spec, CUP, (*self.centre, self.standing), "copper")
-        firm_grip(spec)
+        super()._build(spec)
