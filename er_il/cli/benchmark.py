@@ -32,12 +32,13 @@ def benchmark(
     from er_il.benchmark.plan import Plan
     from er_il.benchmark.run import run
     from er_il.cli.table import results_table
+    from er_il.sole_use import sole_use
     from er_il.workers import LocalExecutor, cores
 
     plan = Plan(asked, (out or Path("outputs/benchmark") / grid.stem).resolve())
     plan.claim()
     folder, console = results or Path("results") / grid.stem, Console()
-    with RayExecutor(ray_address) if ray_address else LocalExecutor(cores()) as executor:
+    with sole_use(plan.out), RayExecutor(ray_address) if ray_address else LocalExecutor(cores()) as executor:
         outcome = run(plan, executor, console, folder)
     console.print(results_table(outcome.report["cells"]))
     console.print(f"{folder / PAGE}", highlight=False, soft_wrap=True)

@@ -19,6 +19,7 @@ from er_il.policy.jobs import RollOut, Train, roll_outs, steps_of
 from er_il.policy.results import load_cell
 from er_il.schedule import Schedule
 from er_il.showcase.showing import film_rollouts, telling_seed, write_report
+from er_il.sole_use import sole_use
 from er_il.tasks import task_id
 from er_il.workers import LocalExecutor
 
@@ -93,6 +94,10 @@ class Demo:
     def run(self, progress: Progress, workers: int) -> list[Cell]:
         """Do all that is not done yet, write the report; return a cell a decoder."""
         self.claim()
+        with sole_use(self.out):
+            return self._run(progress, workers)
+
+    def _run(self, progress: Progress, workers: int) -> list[Cell]:
         recipe = replace(Recipe.load(self.task), seed=self.seed)
         if self.demonstrations is not None:
             recipe = recipe.resized(self.demonstrations)
