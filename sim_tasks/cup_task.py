@@ -77,7 +77,7 @@ class CupTask(ArmTask):
         return self.surface + self.lift
 
     def _build(self, spec: mujoco.MjSpec) -> None:
-        self.cup.add(spec, CUP, (*self.centre, self.standing), "copper")
+        self.cup.add(spec, CUP, (*self.centre, self.standing), "cobalt")
         firm_grip(spec)
 
     def _draw(self, rng: np.random.Generator) -> Placement:
