@@ -23,6 +23,7 @@ from lerobot.processor.converters import (
 )
 from lerobot.scripts import lerobot_record
 from lerobot.utils.import_utils import register_third_party_plugins
+from operating import EPISODE_TIME, right_arrow_after
 
 from er_il import Arm, make_action_space
 from er_il.data.layout import Layout, Part
@@ -156,14 +157,16 @@ def test_stock_record_takes_erj_actions_and_moves_the_joints(tmp_path: Path, mon
     )  # fmt: skip
     arguments = ["--robot.type=er_il_sim", "--robot.camera_names=[]", "--teleop.type=er_il_scripted_leader"]
     arguments += ["--dataset.repo_id=me/erj", f"--dataset.root={root}", "--dataset.fps=60", "--dataset.num_episodes=1"]
-    arguments += ["--dataset.episode_time_s=3", "--dataset.single_task=Reach.", "--dataset.push_to_hub=false"]
-    monkeypatch.setattr(sys, "argv", ["record", *arguments, "--play_sounds=false"])
-    lerobot_record.record(teleop_action_processor=pipeline(EncodeStep()), robot_action_processor=again)  # pyright: ignore[reportCallIssue]
+    arguments += [f"--dataset.episode_time_s={EPISODE_TIME}", "--dataset.single_task=Reach."]
+    arguments += ["--dataset.push_to_hub=false", "--play_sounds=false"]
+    monkeypatch.setattr(sys, "argv", ["record", *arguments])
+    with right_arrow_after(100):
+        lerobot_record.record(teleop_action_processor=pipeline(EncodeStep()), robot_action_processor=again)  # pyright: ignore[reportCallIssue]
     dataset = LeRobotDataset("me/erj", root=root)
     assert dataset.features["action"]["names"] == list(LAYOUT.encoded_names)
     rows = dataset.hf_dataset.with_format("numpy")[:]
     q = np.radians(rows["observation.state"][:, :7])
-    assert np.ptp(q[:, 0]) > 3e-3  # [rad] it moved: how far depends on how many frames a busy machine makes in the time
+    assert np.ptp(q[:, 0]) > 0.2  # [rad] it moved
     commanded = rows["action"][:-1, :3]
     reached = np.array([LAYOUT.parts[0].space.fk(each)[:3, 3] for each in q[1:]])
     assert np.max(np.linalg.norm(reached - commanded, axis=1)) < 0.03  # [m] servos lag

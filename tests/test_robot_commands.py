@@ -15,6 +15,7 @@ from lerobot.robots import RobotConfig, make_robot_from_config
 from lerobot.scripts import lerobot_record, lerobot_replay, lerobot_rollout, lerobot_teleoperate, lerobot_train
 from lerobot.teleoperators import TeleoperatorConfig, make_teleoperator_from_config
 from lerobot.utils.import_utils import register_third_party_plugins
+from operating import EPISODE_TIME, interrupted_after, right_arrow_after
 
 from er_il import cli
 from er_il.data.layout import Layout
@@ -31,6 +32,7 @@ SEED = 7
 SIZE = 32
 ROBOT = ["--robot.type=er_il_sim", f"--robot.seed={SEED}", f"--robot.image_size={SIZE}"]
 LEADER = ["--teleop.type=er_il_scripted_leader", f"--teleop.seed={SEED}"]
+STEPS = 60  # of each recorded episode
 RATE = 60  # [Hz] the simulated world takes its own time, 20 Hz: here three times as fast as life
 NAMES = [*(f"panda_joint{i}.pos" for i in range(1, 8)), "gripper.pos"]
 TINY = ["dim_model=32", "dim_feedforward=32", "n_heads=2", "n_encoder_layers=1", "use_vae=false"]
@@ -59,9 +61,10 @@ def in_degrees(script: np.ndarray) -> np.ndarray:
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     root = tmp_path_factory.mktemp("recorded") / "data"
     dataset = ["--dataset.repo_id=me/reach", f"--dataset.root={root}", "--dataset.single_task=Reach the cup."]
-    dataset += [f"--dataset.fps={RATE}", "--dataset.num_episodes=2", "--dataset.episode_time_s=2"]
+    dataset += [f"--dataset.fps={RATE}", "--dataset.num_episodes=2", f"--dataset.episode_time_s={EPISODE_TIME}"]
     dataset += ["--dataset.reset_time_s=0.1", "--dataset.push_to_hub=false", "--play_sounds=false"]
-    run(lerobot_record.main, *ROBOT, *LEADER, *dataset)
+    with right_arrow_after(STEPS):
+        run(lerobot_record.main, *ROBOT, *LEADER, *dataset)
     return root
 
 
@@ -98,10 +101,9 @@ def test_stock_record_gives_a_dataset_of_the_scripts_in_degrees(recorded: Path):
         rows = columns[:]["episode_index"] == episode
         action, state = columns[:][ACTION][rows], columns[:]["observation.state"][rows]
         expected = in_degrees(script(SEED + episode))  # another world each episode, from its beginning
-        steps = min(len(action), len(expected))
-        assert steps > 40
-        np.testing.assert_allclose(action[:steps], expected[:steps], atol=1e-4)
-        np.testing.assert_allclose(state[1:steps, :7], action[: steps - 1, :7], atol=3.0)  # servos lag
+        assert len(action) == STEPS
+        np.testing.assert_allclose(action, expected[:STEPS], atol=1e-4)
+        np.testing.assert_allclose(state[1:, :7], action[:-1, :7], atol=3.0)  # servos lag
     assert dataset[0]["observation.images.wrist"].std() > 0.01
 
 
@@ -114,16 +116,9 @@ def test_an_erj_policy_drives_the_robot_to_the_cup_through_the_stock_rollout(
     spec = encoded.features[ACTION]["info"]["er_il"]
     actions = Layout.from_spec(spec).encode(in_degrees(script(SEED)))
     said = iter(torch.from_numpy(actions.astype(np.float32)))
-
-    def say(policy: ACTPolicy, batch: object) -> torch.Tensor:
-        """What comes next; the operator interrupts after it, however fast this machine is."""
-        action = next(said, None)
-        if action is None:
-            raise KeyboardInterrupt
-        return action[None]
-
+    say = interrupted_after(len(actions), lambda policy, batch: next(said)[None])
     monkeypatch.setattr(ACTPolicy, "select_action", say)
-    run(lerobot_rollout.main, f"--policy.path={attached}", *ROBOT, "--fps=100", "--duration=120",
+    run(lerobot_rollout.main, f"--policy.path={attached}", *ROBOT, "--fps=100",
         "--task=Reach the cup.", "--return_to_initial_position=false")  # fmt: skip
     assert "Simulated episode 0: success" in capfd.readouterr().err
 
@@ -131,10 +126,11 @@ def test_an_erj_policy_drives_the_robot_to_the_cup_through_the_stock_rollout(
 @pytest.mark.slow
 def test_stock_rollout_records_episodes_of_the_trained_policy_in_joint_positions(attached: Path, tmp_path: Path):
     dataset = ["--dataset.repo_id=me/rollout_reach", f"--dataset.root={tmp_path / 'rollout'}", "--dataset.fps=60"]
-    dataset += ["--dataset.num_episodes=2", "--dataset.episode_time_s=1", "--dataset.reset_time_s=0"]
+    dataset += ["--dataset.num_episodes=2", f"--dataset.episode_time_s={EPISODE_TIME}", "--dataset.reset_time_s=0"]
     dataset += ["--dataset.single_task=Reach the cup.", "--dataset.push_to_hub=false", "--play_sounds=false"]
-    run(lerobot_rollout.main, f"--policy.path={attached}", *ROBOT, "--strategy.type=episodic", f"--fps={RATE}",
-        "--strategy.reset_to_initial_position=false", "--return_to_initial_position=false", *dataset)  # fmt: skip
+    with right_arrow_after(STEPS):
+        run(lerobot_rollout.main, f"--policy.path={attached}", *ROBOT, "--strategy.type=episodic", f"--fps={RATE}",
+            "--strategy.reset_to_initial_position=false", "--return_to_initial_position=false", *dataset)  # fmt: skip
     (root,) = tmp_path.iterdir()
     rollout = LeRobotDataset("me/rollout_reach", root=root, video_backend="pyav")
     assert rollout.num_episodes == 2
@@ -170,10 +166,14 @@ def test_an_attached_policy_is_refused_where_the_environment_decodes(policy: Pat
 
 
 @pytest.mark.slow
-def test_stock_replay_and_teleoperate(recorded: Path, capfd: pytest.CaptureFixture[str]):
+def test_stock_replay_and_teleoperate(
+    recorded: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+):
     replayed = ["--dataset.repo_id=me/reach", f"--dataset.root={recorded}", "--dataset.episode=0"]
     run(lerobot_replay.main, *ROBOT, *replayed, "--play_sounds=false")
-    run(lerobot_teleoperate.main, *ROBOT, *LEADER, "--fps=200", "--teleop_time_s=3")
+    lead = interrupted_after(len(script(SEED)), ScriptedLeader.get_action)
+    monkeypatch.setattr(ScriptedLeader, "get_action", lead)
+    run(lerobot_teleoperate.main, *ROBOT, *LEADER, "--fps=200")
     assert "Simulated episode 0: success" in capfd.readouterr().err
 
 
