@@ -7,6 +7,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from er_il.arm import Vector
+from er_il.errors import PlanError
 from sim_tasks.arm_task import ArmTask, Placement
 from sim_tasks.collision import Collisions
 from sim_tasks.contact import touching
@@ -24,6 +26,7 @@ TIPPED = np.cos(np.radians(25))  # cosine of the tilt from which a stemmed cup f
 CLOSED = 0.5  # opening below which the gripper counts as closed
 CLEARANCE = 0.008  # [m] the leader keeps from the furniture
 GRASP_TIME = 0.5  # [s] that the hand stays once the fingers are told to be closed
+DRAWS = 10  # ways to the cup that the leader considers before it gives up
 REST = 0.5  # [s] at the end, beyond the moment of success: a policy must not learn to stop short of it
 
 # Offset [m] of the hand from the grasp, and base joint [rad] that puts the elbow there (or any).
@@ -117,20 +120,12 @@ class CupTask(ArmTask):
     def _script(self, rng: np.random.Generator) -> tuple[Sequence[Stretch], float]:
         x, y = self.object_pose(CUP)[:2]
         grasp = np.array([x, y, self.standing + GRASP_HEIGHT])
-        off = np.zeros((len(self.way), 3))  # [m] from the nominal places
-        off[0] = rng.uniform(-self._via_range, self._via_range, 3)
-        off[1:-1, 1] = rng.uniform(-self._sway_range, self._sway_range, len(off) - 2)
-        there = [
-            Keyframe(hand_pose(grasp + offset + off[i], PITCH), elbow, straight=i > 0, lean=self.lean)
-            for i, (offset, elbow) in enumerate(self.way)
-        ]
+        reach = self._reach(grasp, rng)
         back = [
             Keyframe(hand_pose(grasp + offset, PITCH), elbow, straight=True, lean=self.lean)
             for offset, elbow in self.way_back
         ]
-        is_free = self._collisions.is_free
-        reach = plan_stretch(self.arm, self.joint_positions, there, is_free)
-        leave = plan_stretch(self.arm, reach[-1], back, is_free)
+        leave = plan_stretch(self.arm, reach[-1], back, self._collisions.is_free)
         speed, closing = rng.uniform(*self._speed_range), rng.uniform(*self._closing_range)
         script = [
             Stretch(reach, gripper=1.0, pace=self.pace),
@@ -138,3 +133,20 @@ class CupTask(ArmTask):
             Stretch(leave, gripper=0.0, hold=REST),
         ]
         return script, speed
+
+    def _reach(self, grasp: Vector, rng: np.random.Generator) -> np.ndarray:
+        """Waypoints (K, n) [rad] to a grasp (3,) [m], of the first way drawn that is clear of the furniture."""
+        blocked = None
+        for _ in range(DRAWS):
+            off = np.zeros((len(self.way), 3))  # [m] from the nominal places
+            off[0] = rng.uniform(-self._via_range, self._via_range, 3)
+            off[1:-1, 1] = rng.uniform(-self._sway_range, self._sway_range, len(off) - 2)
+            there = [
+                Keyframe(hand_pose(grasp + offset + off[i], PITCH), elbow, straight=i > 0, lean=self.lean)
+                for i, (offset, elbow) in enumerate(self.way)
+            ]
+            try:
+                return plan_stretch(self.arm, self.joint_positions, there, self._collisions.is_free)
+            except PlanError as error:
+                blocked = error
+        raise PlanError(f"None of {DRAWS} ways to the cup is free: {blocked}")
