@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from er_il.data.demos import Demo, collect, make_world, record_demo, tally
+from er_il.data.demos import Demo, collect, make_world, record_demo
 from er_il.data.recipe import Recipe
 from er_il.errors import DatasetError, UnknownNameError
 
@@ -79,7 +79,3 @@ def test_a_recipe_that_the_environment_refuses():
         make_world(replace(RECIPE, cameras=("elbow",)))
     with pytest.raises(UnknownNameError, match="task 'sweep'"):
         make_world(replace(RECIPE, task="sweep"))
-
-
-def test_tally_puts_the_most_common_first():
-    assert tally({"timeout": 1, "no plan": 3}) == "no plan 3, timeout 1"

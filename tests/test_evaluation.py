@@ -16,6 +16,7 @@ from er_il import Arm, make_action_space
 from er_il.errors import ErIlError, PolicyError, UnknownNameError
 from er_il.policy.contract import Contract
 from er_il.policy.evaluation import Cell, Episode, evaluate
+from er_il.policy.outcomes import tally
 from er_il.policy.results import load_cell, save_cell, write_cells
 from er_il.policy.rollout import record_rollout
 
@@ -138,3 +139,7 @@ def test_a_recorded_rollout_is_the_evaluated_one(policies: dict[str, Path]):
     assert Counter(trace.status) == evaluated.statuses
     assert len(pictures) == math.ceil(len(trace) / 50) + 1
     assert pictures[0].shape == (720, 960, 3)
+
+
+def test_tally_puts_the_most_common_first():
+    assert tally({"timeout": 1, "no plan": 3}) == "no plan 3, timeout 1"

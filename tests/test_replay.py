@@ -7,7 +7,7 @@ import pytest
 from rich.progress import Progress
 
 from er_il.data.recipe import Recipe
-from er_il.data.record import read_episodes, read_spec
+from er_il.data.record import Record, read_episodes, read_spec
 from er_il.data.recording import generate
 from er_il.data.replay import find_datasets, replay, replay_demo, write_report
 from er_il.errors import DatasetError
@@ -27,6 +27,7 @@ def datasets(tmp_path_factory):
 @pytest.mark.slow
 def test_joint_and_erj_repeat_the_demo_and_task_space_loses_the_elbow(datasets, tmp_path):
     seen = []
+    Record(RECIPE, {1: "collision"}).write(datasets["erj"])  # as if the leader had failed once
     cells = replay(list(datasets.values()), 2, lambda path, name, done, total: seen.append((path.name, name, done)))
     by_name = {cell.decoder: cell for cell in cells}
     assert list(by_name) == ["joint", "task-nearest", "task-posture", "erj"]
@@ -43,6 +44,8 @@ def test_joint_and_erj_repeat_the_demo_and_task_space_loses_the_elbow(datasets, 
     assert (cell["task"], cell["decoder"], cell["successes"], cell["episodes"]) == ("reach_cup", "erj", 2, 2)
     assert cell["interval"] == pytest.approx([0.1581, 1.0], abs=1e-4)
     assert report["cells"][1]["failures"] == {"collision": 2}
+    assert cell["leader"] == {"starts": 3, "dropped": {"collision": 1}}
+    assert report["cells"][0]["leader"] == {"starts": 2, "dropped": {}}
     assert [demo["seed"] for demo in cell["demos"]] == [demo.seed for demo in read_episodes(datasets["joint"])]
 
 

@@ -50,6 +50,15 @@ def test_the_table_holds_every_count() -> None:
     assert "| **0/50** | 0.0% – 7.1% | collision 48, timeout 2 |" in table[3]
 
 
+def test_a_replay_s_table_says_how_often_the_leader_succeeded() -> None:
+    leader = {"starts": 51, "dropped": {"no plan": 1}}
+    replayed = {**CELLS[0], "leader": leader, "max_joint_deviation": 0.0123}
+    heading, _, row = success_table([replayed]).splitlines()
+    assert heading.startswith("| Task | Leader | Decoder |")
+    assert "| 50/51, no plan 1 | erj |" in row
+    assert "| 0.012 rad |" in row
+
+
 def test_the_page_is_rendered_from_the_json(tmp_path: Path) -> None:
     (tmp_path / "report.json").write_text(json.dumps({"meta": META, "cells": CELLS}))
     write_page(

@@ -5,6 +5,7 @@ from typing import Any
 
 from er_il.benchmark import REFERENCE
 from er_il.markdown import markdown_table
+from er_il.policy.outcomes import tally
 
 Report = Mapping[str, Any]  # of results.json
 Cell = Mapping[str, Any]
@@ -45,7 +46,7 @@ def full_table(report: Report) -> str:
         row += [f"**{cell['successes']}/{cell['episodes']}**", percentages(cell["interval"])]
         row.append(", ".join(str(each["successes"]) for each in cell["per_seed"]))
         row += [difference(cell) or NONE] * paired
-        row.append(", ".join(f"{name} {count}" for name, count in cell["failures"].items()) or NONE)
+        row.append(tally(cell["failures"]) or NONE)
         row += [f"{cell['invalid_rate']:.1%}", f"{cell['decode_p50_ms']:.2f} / {cell['decode_p99_ms']:.2f} ms"]
         row.append(f"{cell['max_joint_step']:.3f} rad")
         row += [f"{100 * cell['elbow_error']:.1f} cm" if "elbow_error" in cell else NONE] * elbows

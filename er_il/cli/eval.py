@@ -30,6 +30,7 @@ def eval(
 
     from er_il.cli.progress import make_progress
     from er_il.policy.evaluation import evaluate
+    from er_il.policy.outcomes import tally
     from er_il.policy.results import write_cells
     from er_il.policy.training import pretrained
     from er_il.provenance import provenance
@@ -51,7 +52,7 @@ def eval(
     write_cells([cell], meta, folder)
     report = cell.report()
     low, high = report["interval"]
-    failures = ", ".join(f"{name} {count}" for name, count in report["failures"].items()) or "none"
+    failures = tally(report["failures"]) or "none"
     console.print(
         f"Success {cell.successes}/{episodes} (exact 95 % interval {low:.1%} to {high:.1%})\n"
         f"Failures: {failures}\n"

@@ -46,8 +46,8 @@ def generate(
         recipe = recipe.resized(episodes)
     given = {"seed": seed, "arm": arm, "cameras": _split(cameras), "image_size": size}
     recipe = replace(recipe, **{key: value for key, value in given.items() if value is not None})
-    from er_il.data.demos import tally
     from er_il.data.recording import generate as generate_datasets  # seconds of imports: wrong options are told before
+    from er_il.policy.outcomes import tally
 
     name = task if recipe.arm == usual.arm else f"{task}_{recipe.arm}"
     folder = out if out is not None else Path("datasets") / name

@@ -19,6 +19,7 @@ def replay(datasets: Positional[tuple[str, ...]], *, out: Path = Path("outputs/r
     from er_il.data.replay import find_datasets, write_report
     from er_il.data.replay import replay as replay_datasets
     from er_il.errors import DatasetError
+    from er_il.policy.outcomes import tally
     from er_il.provenance import provenance
     from er_il.workers import cores
 
@@ -39,12 +40,11 @@ def replay(datasets: Positional[tuple[str, ...]], *, out: Path = Path("outputs/r
     for cell in cells:
         report = cell.report()
         low, high = report["interval"]
-        failures = ", ".join(f"{name} {count}" for name, count in report["failures"].items())
         table.add_row(
             cell.task,
             cell.decoder,
             f"{cell.successes}/{len(cell.demos)} ({100 * low:.0f} to {high:.0%})",
-            failures,
+            tally(report["failures"]),
             f"{report['invalid_rate']:.1%}",
             f"{report['max_joint_deviation']:.4f}",
         )

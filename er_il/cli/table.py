@@ -5,6 +5,8 @@ from typing import Any
 
 from rich.table import Table
 
+from er_il.policy.outcomes import tally
+
 
 def results_table(cells: Sequence[Mapping[str, Any]]) -> Table:
     """Show reported cells, one a row."""
@@ -22,6 +24,6 @@ def results_table(cells: Sequence[Mapping[str, Any]]) -> Table:
             f"{cell['successes']}/{cell['episodes']}",
             f"{low:.1%} to {high:.1%}",
             f"{cell['invalid_rate']:.1%}",
-            ", ".join(f"{name} {count}" for name, count in cell["failures"].items()) or "none",
+            tally(cell["failures"]) or "none",
         )
     return table

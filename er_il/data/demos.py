@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from er_il.data.disturbance import disturbances
 from er_il.data.recipe import Recipe
 from er_il.errors import DatasetError, PlanError
+from er_il.policy.outcomes import tally
 from er_il.tasks import task_id
 from er_il.whole_file import write_arrays
 from er_il.workers import worker_pool
@@ -138,11 +139,6 @@ def collect(recipe: Recipe, folder: Path, workers: int) -> Iterator[tuple[int, s
                     f"the leader cannot do {recipe.task} like this. Look at the recipe's randomisation."
                 )
             yield seed, reason
-
-
-def tally(reasons: Mapping[str, int]) -> str:
-    """Return counted reasons, the most common first: ``no plan 3, timeout 1``."""
-    return ", ".join(f"{reason} {count}" for reason, count in Counter(reasons).most_common())
 
 
 def demo_path(folder: Path, seed: int) -> Path:

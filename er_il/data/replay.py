@@ -48,6 +48,7 @@ class ReplayCell:
     task: str
     decoder: str
     demos: tuple[Replayed, ...]
+    dropped: Counter[str]  # why the leader's other starts gave no demo
 
     @property
     def successes(self) -> int:
@@ -57,6 +58,7 @@ class ReplayCell:
     def report(self) -> dict[str, Any]:
         """Return the cell as JSON."""
         return summarise(self.task, self.decoder, self.demos) | {
+            "leader": {"starts": len(self.demos) + self.dropped.total(), "dropped": dict(self.dropped.most_common())},
             "max_joint_deviation": max(demo.deviation for demo in self.demos),
             "demos": [
                 {"seed": demo.seed, "success": demo.success, "failure": demo.failure, "max_deviation": demo.deviation}
@@ -86,7 +88,8 @@ def replay(datasets: Sequence[Path], workers: int, advance: Callable[[Path, str,
             for job in jobs:
                 done.append(job.result())
                 advance(path, play.decoder, len(done), len(jobs))
-            cells.append(ReplayCell(play.recipe.task, play.decoder, tuple(done)))
+            dropped = Counter(Record.read(path).dropped.values())
+            cells.append(ReplayCell(play.recipe.task, play.decoder, tuple(done), dropped))
     return cells
 
 

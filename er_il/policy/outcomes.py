@@ -1,7 +1,7 @@
 """What episodes amount to: counts, an exact interval, and the statuses of their decodes."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
 from er_il.kinematics import Status
@@ -30,6 +30,11 @@ class Outcome(Protocol):
     def joint_step(self) -> float:
         """Largest joint change [rad] that a decoded action asked for."""
         ...
+
+
+def tally(reasons: Mapping[str, int]) -> str:
+    """Return counted reasons, the most common first: ``no plan 3, timeout 1``."""
+    return ", ".join(f"{reason} {count}" for reason, count in Counter(reasons).most_common())
 
 
 def summarise(task: str, decoder: str, episodes: Sequence[Outcome]) -> dict[str, Any]:

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from er_il.markdown import markdown_table
+from er_il.policy.outcomes import tally
 
 REPORT, CHART, PAGE = "report.json", "success.png", "report.md"
 PICTURES = (".png", ".webp")  # shown on the page; other files are linked
@@ -41,23 +42,26 @@ def label_of(decoder: str, *, broken: bool = False) -> str:
 
 def success_table(cells: Sequence[Mapping[str, Any]]) -> str:
     """Render results of rollouts or replays as a Markdown table."""
-    headings = ["Task", "Decoder", "Success", "95 % interval", "Failures", "Invalid actions"]
-    timed, compared = "decode_p50_ms" in cells[0], "max_joint_deviation" in cells[0]
-    headings += ["Decode p50 / p99"] * timed + ["Joints off the demo by"] * compared + ["Largest step"]
+    timed, replayed = "decode_p50_ms" in cells[0], "leader" in cells[0]
+    headings = ["Task", *["Leader"] * replayed, "Decoder", "Success", "95 % interval", "Failures", "Invalid actions"]
+    headings += ["Decode p50 / p99"] * timed + ["Joints off the demo by"] * replayed + ["Largest step"]
     rows = []
     for cell in cells:
         low, high = cell["interval"]
-        row = [
-            cell["task"],
+        row = [cell["task"]]
+        if replayed:
+            starts, dropped = cell["leader"]["starts"], cell["leader"]["dropped"]
+            row.append(", ".join(filter(None, [f"{starts - sum(dropped.values())}/{starts}", tally(dropped)])))
+        row += [
             cell["decoder"],
             f"**{cell['successes']}/{cell['episodes']}**",
             f"{low:.1%} – {high:.1%}",
-            ", ".join(f"{name} {count}" for name, count in cell["failures"].items()) or "–",
+            tally(cell["failures"]) or "–",
             f"{cell['invalid_rate']:.1%}",
         ]
         if timed:
             row.append(f"{cell['decode_p50_ms']:.2f} / {cell['decode_p99_ms']:.2f} ms")
-        if compared:
+        if replayed:
             row.append(f"{cell['max_joint_deviation']:.3f} rad")
         rows.append([*row, f"{cell['max_joint_step']:.3f} rad"])
     return markdown_table(headings, rows)
