@@ -165,7 +165,7 @@ def _origin(report: Report) -> str:
             f"- code: {', '.join(meta['computed_by'])}",
             f"- versions: {versions}",
             f"- machine: {meta['machine']['processor']}, {meta['machine']['cores']} cores",
-            f"- mixed precision of the trainings: {', '.join(meta.get('mixed_precision', ['no']))}",
+            f"- mixed precision of the trainings: {', '.join(meta['mixed_precision'])}",
             f"- trained on {demonstrations} demonstrations (recipe seed 0; normalised with the statistics of all that "
             "were recorded)",
             f"- training seeds: {', '.join(map(str, meta['grid']['training_seeds']))}; "

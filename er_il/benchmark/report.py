@@ -78,7 +78,7 @@ def _meta(plan: Plan, cells: list[dict[str, Any]]) -> dict[str, Any]:
         "grid": grid.to_dict(),
         "computed_by": sorted({notes["git"] for notes in (*trained, *rolled_out)}),
         "training_steps": {training.space: training.steps for training in sorted(trainings, key=lambda t: t.space)},
-        "mixed_precision": sorted({notes.get("mixed_precision", "no") for notes in trained}),
+        "mixed_precision": sorted({notes["mixed_precision"] for notes in trained}),
         "rollout_seeds": f"{FIRST_SEED} to {FIRST_SEED + grid.rollouts - 1}",
         "costs": {
             "trainings": len(trained),
