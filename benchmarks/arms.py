@@ -12,9 +12,9 @@ from functools import partial
 from math import cos, pi, radians, sin
 
 from er_il import Arm
-from er_il.chain import ChainJoint, Tool, Triple, chain_urdf
-from er_il.presets import PRESETS
-from er_il.urdf import example_robot_data, generated_urdf
+from er_il.arms.chain import ChainJoint, Tool, Triple, chain_urdf
+from er_il.arms.presets import PRESETS
+from er_il.arms.urdf import example_robot_data, generated_urdf
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 Range = tuple[float, float]

@@ -4,7 +4,7 @@
     uv run python docs/render_readme.py  # the table of docs/arms.md
 
 Configurations are uniform within the limits, seeds uniform within the seed error of each joint. A configuration is
-back if no joint is off by more than 1e-3 rad; the causes of a miss are those of :mod:`er_il.round_trip`.
+back if no joint is off by more than 1e-3 rad; the causes of a miss are those of :mod:`er_il.spaces.round_trip`.
 """
 
 from collections import Counter
@@ -16,10 +16,10 @@ from arms import REDUNDANT
 from rich.progress import Progress
 
 from er_il import make_action_space
-from er_il.provenance import provenance
-from er_il.round_trip import CAUSES, EXACT, SINGULAR, round_trips
-from er_il.whole_file import write_json
-from er_il.workers import cores, run_jobs
+from er_il.spaces.round_trip import CAUSES, EXACT, SINGULAR, round_trips
+from er_il.support.atomic_files import write_json
+from er_il.support.provenance import provenance
+from er_il.support.workers import cores, run_jobs
 
 SPACES = ("erj", "era")
 SEED_ERRORS = (0.1, 0.03)  # [rad]

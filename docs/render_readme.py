@@ -10,12 +10,12 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from er_il.benchmark import RESULTS
-from er_il.benchmark.table import compact_table
-from er_il.showcase.circle import drift_table
-from er_il.showcase.report import REPORT, success_table
-from er_il.study.arms_table import round_trips_table
-from er_il.study.tables import deltas_table, joints_table, training_time_table, validity_table
+from er_il.evaluation.results import RESULTS
+from er_il.experiments.studies.circle import drift_table
+from er_il.report.arms_table import round_trips_table
+from er_il.report.benchmark_table import compact_table
+from er_il.report.study_tables import deltas_table, joints_table, training_time_table, validity_table
+from er_il.report.success import REPORT, success_table
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))

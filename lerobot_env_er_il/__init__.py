@@ -1,5 +1,5 @@
 """LeRobot finds plugins by distribution name; importing this module registers er_il's."""
 
-import er_il.policy.lerobot_env  # --env.type=er_il
-import er_il.robot.hardware  # --robot.type=er_il_sim --teleop.type=er_il_scripted_leader
-import er_il.robot.processors  # noqa: F401  the decoding steps of policies and pipelines
+import er_il.envs.lerobot_plugin  # --env.type=er_il
+import er_il.robots.hardware  # --robot.type=er_il_sim --teleop.type=er_il_scripted_leader
+import er_il.robots.processors  # noqa: F401  the decoding steps of policies and pipelines

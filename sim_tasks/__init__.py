@@ -12,7 +12,7 @@ if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get(
 
 import gymnasium
 
-from er_il.errors import RenderError
+from er_il.support.errors import RenderError
 
 try:
     import mujoco  # noqa: F401
@@ -22,13 +22,13 @@ except (ImportError, AttributeError, RuntimeError) as error:  # each GL backend 
         "Valid: egl, osmesa, glfw; `er-il doctor` says which of them this machine has."
     ) from error
 
-from sim_tasks.arm_task import ArmTask
-from sim_tasks.lift_cup import LiftCup
-from sim_tasks.push_button_elbow import PushButtonElbow
-from sim_tasks.reach_cup import ReachCup
-from sim_tasks.reach_remove_cup import ReachRemoveCup
-from sim_tasks.remove_cup import RemoveCup
-from sim_tasks.retrieve_bear import RetrieveBear
+from sim_tasks.tasks.arm_task import ArmTask
+from sim_tasks.tasks.lift_cup import LiftCup
+from sim_tasks.tasks.push_button_elbow import PushButtonElbow
+from sim_tasks.tasks.reach_cup import ReachCup
+from sim_tasks.tasks.reach_remove_cup import ReachRemoveCup
+from sim_tasks.tasks.remove_cup import RemoveCup
+from sim_tasks.tasks.retrieve_bear import RetrieveBear
 
 TASKS: tuple[type[ArmTask], ...] = (ReachCup, RemoveCup, ReachRemoveCup, LiftCup, PushButtonElbow, RetrieveBear)
 

@@ -12,8 +12,8 @@ from typing import Any
 import gymnasium
 
 import sim_tasks  # noqa: F401  registers the tasks
-from er_il.schedule import FileResult
-from er_il.whole_file import write_whole
+from er_il.experiments.schedule import FileResult
+from er_il.support.atomic_files import write_whole
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from sim_tasks.arm_task import ArmTask
+from sim_tasks.tasks.arm_task import ArmTask
 
 
 def play(world: ArmTask, actions: Iterable[np.ndarray]) -> str:

@@ -8,10 +8,10 @@ import pytest
 from chains import write_chain
 
 from er_il import Arm, ArmAngleFrames
-from er_il.errors import ArmError, ErIlError, UnknownNameError
-from er_il.kinematics import kinematics_of
-from er_il.panda8 import panda8_urdf
-from er_il.urdf import example_robot_data
+from er_il.arms.panda8 import panda8_urdf
+from er_il.arms.urdf import example_robot_data
+from er_il.kinematics.solver import kinematics_of
+from er_il.support.errors import ArmError, ErIlError, UnknownNameError
 
 PANDA = Arm.preset("panda")
 

@@ -15,20 +15,20 @@ from documented import documented, run, train_in_process
 from file_jobs import InOrder
 from matplotlib.image import imread
 
-from er_il.arm import Arm
-from er_il.benchmark.grid import Entry, Grid, GridError
-from er_il.benchmark.page import write_pages
-from er_il.benchmark.plan import Plan
-from er_il.benchmark.report import cell_report, write_results
-from er_il.benchmark.strip import strips
-from er_il.benchmark.table import compact_table
+from er_il.arms.arm import Arm
 from er_il.cli.benchmark import benchmark
-from er_il.errors import ErIlError, UnknownNameError
-from er_il.policy.elbow import ElbowReference
-from er_il.policy.evaluation import Cell, Episode
-from er_il.policy.postures import grasp_posture, mean_posture
+from er_il.evaluation.elbow import ElbowReference
+from er_il.evaluation.posture_baselines import grasp_posture, mean_posture
+from er_il.evaluation.rollouts import Cell, Episode
+from er_il.experiments.grid import Entry, Grid, GridError
+from er_il.experiments.plan import Plan
+from er_il.experiments.report import cell_report, write_results
+from er_il.experiments.schedule import Schedule
+from er_il.experiments.strip import strips
 from er_il.policy.training import PRECISION
-from er_il.schedule import Schedule
+from er_il.report.benchmark_page import write_pages
+from er_il.report.benchmark_table import compact_table
+from er_il.support.errors import ErIlError, UnknownNameError
 
 PANDA = Arm.preset("panda")
 TINY = {
@@ -260,7 +260,7 @@ def test_a_grid_from_end_to_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     # All in this process, which imports LeRobot once; test_demo has workers and trains in processes of their own.
-    monkeypatch.setattr("er_il.workers.LocalExecutor", lambda workers: nullcontext(InOrder()))
+    monkeypatch.setattr("er_il.support.workers.LocalExecutor", lambda workers: nullcontext(InOrder()))
     train_in_process(monkeypatch)
     monkeypatch.chdir(tmp_path)
     short = {"tasks": [TASK]}

@@ -10,10 +10,10 @@ from lerobot.model import RobotKinematics
 from matplotlib.image import imread
 
 from er_il import Arm
+from er_il.arms.urdf import generated_urdf
 from er_il.cli import main
-from er_il.errors import ArmError
-from er_il.showcase.circle import LAPS, POSES, drift_table, drive_all, targets
-from er_il.urdf import generated_urdf
+from er_il.experiments.studies.circle import LAPS, POSES, drift_table, drive_all, targets
+from er_il.support.errors import ArmError
 
 PANDA = Arm.preset("panda")
 

@@ -10,10 +10,10 @@ import pytest
 from file_jobs import FileJob, graph
 from ray.cluster_utils import Cluster
 
-from er_il.benchmark.cluster import RayExecutor
-from er_il.errors import ErIlError
-from er_il.schedule import Schedule
-from er_il.workers import LocalExecutor
+from er_il.experiments.cluster import RayExecutor
+from er_il.experiments.schedule import Schedule
+from er_il.support.errors import ErIlError
+from er_il.support.workers import LocalExecutor
 
 
 def many(folder: Path, sleep: float = 0.5) -> list[FileJob]:

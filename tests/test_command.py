@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from er_il import Arm, Status, make_action_space
-from er_il.command import Commander
-from er_il.errors import ErIlError, UnknownNameError
+from er_il.control.commander import Commander
+from er_il.support.errors import ErIlError, UnknownNameError
 
 PANDA = Arm.preset("panda")
 PERIOD = 0.05

@@ -5,12 +5,12 @@ import pytest
 from lerobot.policies.act.configuration_act import ACTConfig
 
 from er_il import Arm, make_action_space
-from er_il.data.layout import Layout
-from er_il.data.schema import action_feature
-from er_il.errors import PolicyError
-from er_il.policy.contract import Contract, check_policy, policy_contract
-from er_il.resources import data_dir
+from er_il.datasets.schema import action_feature
+from er_il.envs.contract import Contract, check_policy, policy_contract
 from er_il.spaces import ActionSpace
+from er_il.spaces.layout import Layout
+from er_il.support.errors import PolicyError
+from er_il.support.resources import data_dir
 
 PANDA = Arm.preset("panda")
 SPACES = {kind: make_action_space(kind, PANDA) for kind in ("joint", "task", "erj")}

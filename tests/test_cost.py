@@ -4,7 +4,7 @@ import subprocess
 import sys
 import time
 
-from er_il.cost import measured
+from er_il.support.cost import measured
 
 BUSY = "import time\nwhile time.process_time() < 0.5: pass"
 

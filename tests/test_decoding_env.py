@@ -3,10 +3,10 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from er_il.errors import UnknownNameError
-from er_il.policy.decoders import DECODERS, Decoder, decoder
-from er_il.policy.decoding_env import make_decoding_env
-from er_il.tasks import task_id, task_names
+from er_il.envs.decoders import DECODERS, Decoder, decoder
+from er_il.envs.tasks import task_id, task_names
+from er_il.envs.wrapper import make_decoding_env
+from er_il.support.errors import UnknownNameError
 
 REACH = task_id("reach_cup")
 

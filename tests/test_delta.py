@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from er_il import ActionSpace, Arm, Status, from_spec, make_action_space
-from er_il.errors import BoundsError, ShapeError, UnknownNameError
 from er_il.spaces import DeltaBounds, DeltaSpace
+from er_il.support.errors import BoundsError, ShapeError, UnknownNameError
 
 PANDA = Arm.preset("panda")
 KINDS = ["joint", "task", "erj", "era"]

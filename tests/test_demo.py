@@ -9,8 +9,8 @@ from documented import documented
 from rich.progress import Progress
 
 from er_il.cli import main
-from er_il.errors import ErIlError, UnknownNameError
-from er_il.showcase.demo import Demo
+from er_il.experiments.demo import Demo
+from er_il.support.errors import ErIlError, UnknownNameError
 
 
 def small(out: Path, **kwargs: object) -> Demo:

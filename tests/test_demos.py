@@ -3,9 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from er_il.data.demos import Demo, collect, make_world, record_demo
-from er_il.data.recipe import Recipe
-from er_il.errors import DatasetError, UnknownNameError
+from er_il.datasets.demos import Demo, collect, make_world, record_demo
+from er_il.datasets.recipe import Recipe
+from er_il.support.errors import DatasetError, UnknownNameError
 
 RECIPE = Recipe.load("lift_cup")
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from er_il.data.disturbance import CALM_AFTER, CALM_BEFORE, disturbances
+from er_il.datasets.disturbance import CALM_AFTER, CALM_BEFORE, disturbances
 
 PERIOD, DEVIATION, CLOSES = 0.05, 0.01, 4000  # [s], [rad], step
 

@@ -6,13 +6,14 @@ import pyarrow.parquet as pq
 import pytest
 from lerobot.datasets import LeRobotDataset
 
-from er_il.arm import Arm
-from er_il.data.encoding import encode_dataset
-from er_il.data.layout import Layout
-from er_il.data.scales import loosen_rotations
-from er_il.data.schema import ACTION, LEADER_JOINTS, action_feature
-from er_il.errors import DatasetError
+from er_il.arms.arm import Arm
+from er_il.datasets.encoding import encode_dataset
+from er_il.datasets.normalisation import loosen_rotations
+from er_il.datasets.schema import LEADER_JOINTS, action_feature
 from er_il.spaces import make_action_space
+from er_il.spaces.layout import Layout
+from er_il.spaces.spec import ACTION
+from er_il.support.errors import DatasetError
 
 PANDA = Arm.preset("panda")
 LENGTHS = (30, 25)

@@ -3,10 +3,10 @@ import pytest
 from chains import chain_arm
 
 from er_il import ActionSpace, Arm, Status, from_spec, make_action_space
-from er_il.arm_angle import ElbowCircle
-from er_il.data.references import fitted
-from er_il.errors import ArmError, SpecError
-from er_il.round_trip import EXACT
+from er_il.kinematics.arm_angle import ElbowCircle
+from er_il.spaces.references import fitted
+from er_il.spaces.round_trip import EXACT
+from er_il.support.errors import ArmError, SpecError
 
 PANDA = Arm.preset("panda")
 

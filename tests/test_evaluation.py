@@ -13,12 +13,12 @@ from lerobot.policies.act.configuration_act import ACTConfig
 from lerobot.policies.act.modeling_act import ACTPolicy
 
 from er_il import Arm, make_action_space
-from er_il.errors import ErIlError, PolicyError, UnknownNameError
-from er_il.policy.contract import Contract
-from er_il.policy.evaluation import Cell, Episode, evaluate
-from er_il.policy.outcomes import tally
-from er_il.policy.results import load_cell, save_cell, write_cells
-from er_il.policy.rollout import record_rollout
+from er_il.envs.contract import Contract
+from er_il.evaluation.recording import record_rollout
+from er_il.evaluation.results import load_cell, save_cell, write_cells
+from er_il.evaluation.rollouts import Cell, Episode, evaluate
+from er_il.support.counts import tally
+from er_il.support.errors import ErIlError, PolicyError, UnknownNameError
 
 PANDA = Arm.preset("panda")
 

@@ -3,7 +3,7 @@ import sys
 import pytest
 
 from er_il.cli import USER_MISTAKE, main
-from er_il.data.record import Record
+from er_il.datasets.record import Record
 
 
 def _run(monkeypatch, *arguments):

@@ -7,8 +7,9 @@ import pytest
 from chains import chain_arm
 
 from er_il import Arm
-from er_il.errors import ArmError
-from er_il.joint_choice import (
+from er_il.kinematics.solver import kinematics_of
+from er_il.spaces import make_action_space
+from er_il.spaces.joint_choice import (
     FLIP,
     along_demos,
     choices,
@@ -19,9 +20,8 @@ from er_il.joint_choice import (
     sensitivities,
     stretches,
 )
-from er_il.kinematics import kinematics_of
-from er_il.round_trip import SINGULAR
-from er_il.spaces import make_action_space
+from er_il.spaces.round_trip import SINGULAR
+from er_il.support.errors import ArmError
 
 PANDA = Arm.preset("panda")
 ODD, EVEN = ([(f"panda_joint{i}",) for i in numbers] for numbers in ((1, 3, 5, 7), (2, 4, 6)))

@@ -4,8 +4,8 @@ from chains import chain_arm, write_chain
 from scipy.spatial.transform import Rotation
 
 from er_il import Arm, Status
-from er_il.errors import ShapeError, UnknownNameError
-from er_il.kinematics import kinematics_of
+from er_il.kinematics.solver import kinematics_of
+from er_il.support.errors import ShapeError, UnknownNameError
 
 PANDA = Arm.preset("panda")
 KINEMATICS = kinematics_of(PANDA)

@@ -5,13 +5,14 @@ from foreign import ARMS, LENGTHS, NAMES, bimanual, paths
 from scipy.spatial.transform import Rotation
 
 from er_il import Arm
-from er_il.data.layout import Layout, Part
-from er_il.data.motors import Motors
-from er_il.data.portable import arm_from_spec
-from er_il.data.schema import ACTION, dimension_names
-from er_il.data.wiring import Wiring, read_wirings, wire
-from er_il.errors import DatasetError, ErIlError, SpecError, UnknownNameError
+from er_il.arms.portable import arm_from_spec
+from er_il.datasets.schema import dimension_names
+from er_il.datasets.wiring import Wiring, read_wirings, wire
 from er_il.spaces import make_action_space
+from er_il.spaces.layout import Layout, Part
+from er_il.spaces.motors import Motors
+from er_il.spaces.spec import ACTION
+from er_il.support.errors import DatasetError, ErIlError, SpecError, UnknownNameError
 
 PANDA = Arm.preset("panda")
 FEATURES = {ACTION: {"dtype": "float32", "shape": (len(NAMES),), "names": list(NAMES)}}

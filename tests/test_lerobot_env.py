@@ -8,8 +8,8 @@ from lerobot.envs.factory import make_env_config
 from lerobot.envs.utils import NEW_ROLLOUT_OPTION
 from lerobot.utils.import_utils import register_third_party_plugins
 
-from er_il.errors import UnknownNameError
-from er_il.policy.lerobot_env import ErIlEnvConfig
+from er_il.envs.lerobot_plugin import ErIlEnvConfig
+from er_il.support.errors import UnknownNameError
 
 
 def test_lerobot_finds_the_environment_by_the_distributions_name():

@@ -5,10 +5,10 @@ import pytest
 from arms import REDUNDANT, SIX_JOINTS
 
 from er_il import Arm, ArmAngleFrames, Status, make_action_space
-from er_il.errors import ArmError
-from er_il.kinematics import kinematics_of
-from er_il.round_trip import UNEXPLAINED, round_trips
-from er_il.urdf import example_robot_data
+from er_il.arms.urdf import example_robot_data
+from er_il.kinematics.solver import kinematics_of
+from er_il.spaces.round_trip import UNEXPLAINED, round_trips
+from er_il.support.errors import ArmError
 
 TIAGO = example_robot_data("tiago_description/robots/tiago.urdf")
 

@@ -9,10 +9,10 @@ from lerobot.policies import PreTrainedPolicy
 from lerobot.policies.diffusion.modeling_diffusion import DiffusionPolicy
 from rich.progress import Progress
 
-from er_il.data.recipe import Recipe
-from er_il.data.recording import generate
-from er_il.policy.contract import policy_contract
-from er_il.policy.evaluation import evaluate
+from er_il.datasets.recipe import Recipe
+from er_il.datasets.recording import generate
+from er_il.envs.contract import policy_contract
+from er_il.evaluation.rollouts import evaluate
 from er_il.policy.training import pretrained
 
 

@@ -10,13 +10,13 @@ from documented import documented, run, train_in_process
 from lerobot.policies.act.configuration_act import ACTConfig
 
 from er_il import Arm, make_action_space
-from er_il.errors import UnknownNameError
+from er_il.envs.contract import Contract
+from er_il.envs.decoders import Decoder
+from er_il.envs.wrapper import make_decoding_env
 from er_il.policy.actor import environment_of
-from er_il.policy.contract import Contract
-from er_il.policy.decoders import Decoder
-from er_il.policy.decoding_env import make_decoding_env
-from sim_tasks.arm_task import ArmTask
-from sim_tasks.lift_cup import LiftCup
+from er_il.support.errors import UnknownNameError
+from sim_tasks.tasks.arm_task import ArmTask
+from sim_tasks.tasks.lift_cup import LiftCup
 
 PANDA8 = Arm.preset("panda8")
 TASKS = ("LiftCup", "ReachCup", "PushButtonElbow")

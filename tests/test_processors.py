@@ -26,10 +26,10 @@ from lerobot.utils.import_utils import register_third_party_plugins
 from operating import EPISODE_TIME, right_arrow_after
 
 from er_il import Arm, make_action_space
-from er_il.data.layout import Layout, Part
-from er_il.data.motors import Motors
-from er_il.errors import ErIlError, ShapeError
-from er_il.robot.processors import DecodePolicyAction, DecodeRobotAction
+from er_il.robots.processors import DecodePolicyAction, DecodeRobotAction
+from er_il.spaces.layout import Layout, Part
+from er_il.spaces.motors import Motors
+from er_il.support.errors import ErIlError, ShapeError
 
 PANDA = Arm.preset("panda")
 JOINTS = tuple(f"{joint}.pos" for joint in PANDA.joints)

@@ -4,7 +4,7 @@ import runpy
 from pathlib import Path
 
 from sim_tasks import TASKS
-from sim_tasks.arm_task import RATE
+from sim_tasks.tasks.arm_task import RATE
 
 ROOT = Path(__file__).resolve().parents[1]
 

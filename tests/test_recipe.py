@@ -5,9 +5,9 @@ import gymnasium
 import numpy as np
 import pytest
 
-from er_il.data.recipe import DEMO_SEED_BASE, Recipe, recipe_names
-from er_il.errors import DatasetError, UnknownNameError
-from er_il.tasks import task_id, task_names
+from er_il.datasets.recipe import DEMO_SEED_BASE, Recipe, recipe_names
+from er_il.envs.tasks import task_id, task_names
+from er_il.support.errors import DatasetError, UnknownNameError
 
 FIRST_EVALUATION_SEED = 1000  # LeRobot's
 

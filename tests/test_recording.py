@@ -11,14 +11,15 @@ import pytest
 from lerobot.datasets import LeRobotDataset
 from rich.progress import Progress
 
-from er_il.data.demos import Demo, make_world, record_demo
-from er_il.data.recipe import Recipe
-from er_il.data.record import Record
-from er_il.data.recording import generate
-from er_il.data.scales import LEAST_DEVIATION, LEAST_ROTATION, MARGIN
-from er_il.data.schema import ACTION, DEMO_SEED, ENVIRONMENT_STATE, LEADER_JOINTS, STATE, action_spec
-from er_il.errors import DatasetError, UnknownNameError
+from er_il.datasets.demos import Demo, make_world, record_demo
+from er_il.datasets.normalisation import LEAST_DEVIATION, LEAST_ROTATION, MARGIN
+from er_il.datasets.recipe import Recipe
+from er_il.datasets.record import Record
+from er_il.datasets.recording import generate
+from er_il.datasets.schema import DEMO_SEED, ENVIRONMENT_STATE, LEADER_JOINTS, STATE
 from er_il.spaces import from_spec
+from er_il.spaces.spec import ACTION, action_spec
+from er_il.support.errors import DatasetError, UnknownNameError
 
 RECIPE = Recipe.load("lift_cup").resized(3)
 

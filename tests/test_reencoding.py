@@ -15,12 +15,13 @@ from lerobot.scripts import lerobot_edit_dataset, lerobot_train
 
 from er_il import Arm
 from er_il.cli import USER_MISTAKE, main
-from er_il.data import decoding, encoding
-from er_il.data.encoding import dataset_info, dataset_layout
-from er_il.data.hub import find_dataset
-from er_il.data.rewriting import read_vectors
-from er_il.data.scales import LEAST_ROTATION
-from er_il.data.schema import ACTION, SOURCE_ACTION, STATE
+from er_il.datasets import decoding, encoding
+from er_il.datasets.encoding import dataset_info, dataset_layout
+from er_il.datasets.hub import find_dataset
+from er_il.datasets.normalisation import LEAST_ROTATION
+from er_il.datasets.rewriting import read_vectors
+from er_il.datasets.schema import SOURCE_ACTION, STATE
+from er_il.spaces.spec import ACTION
 
 RECORDED = np.concatenate([np.stack([each[name] for name in NAMES], axis=1) for each in bimanual()])
 

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 import sim_tasks  # noqa: F401
-from er_il.kinematics import kinematics_of
-from sim_tasks.cabinet_cup import OUTSIDE
-from sim_tasks.reach_remove_cup import ReachRemoveCup
-from sim_tasks.remove_cup import RemoveCup
+from er_il.kinematics.solver import kinematics_of
+from sim_tasks.tasks.cabinet_cup import OUTSIDE
+from sim_tasks.tasks.reach_remove_cup import ReachRemoveCup
+from sim_tasks.tasks.remove_cup import RemoveCup
 
 TASKS = (RemoveCup, ReachRemoveCup)
 

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from rich.progress import Progress
 
-from er_il.data.recipe import Recipe
-from er_il.data.record import Record, read_episodes, read_spec
-from er_il.data.recording import generate
-from er_il.data.replay import find_datasets, replay, replay_demo, write_report
-from er_il.errors import DatasetError
-from er_il.policy.decoders import decoder
-from er_il.policy.decoding_env import make_decoding_env
-from er_il.tasks import task_id
+from er_il.datasets.recipe import Recipe
+from er_il.datasets.record import Record, read_episodes, read_spec
+from er_il.datasets.recording import generate
+from er_il.envs.decoders import decoder
+from er_il.envs.tasks import task_id
+from er_il.envs.wrapper import make_decoding_env
+from er_il.evaluation.replay import find_datasets, replay, replay_demo, write_report
+from er_il.support.errors import DatasetError
 
 RECIPE = replace(Recipe.load("reach_cup"), disturbance=0.0).resized(2)
 

@@ -9,9 +9,9 @@ import pytest
 from matplotlib.image import imread
 from PIL import Image
 
-from er_il.showcase.animation import PAUSE, WIDTH, Panel, write_animation
-from er_il.showcase.pictures import Row, moments, write_film, write_strip
-from er_il.showcase.report import CHART, success_table, write_page
+from er_il.report.animation import PAUSE, WIDTH, Panel, write_animation
+from er_il.report.pictures import Row, moments, write_film, write_strip
+from er_il.report.success import CHART, success_table, write_page
 
 CELLS = [
     {

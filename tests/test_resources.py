@@ -1,5 +1,5 @@
-from er_il import resources
-from er_il.resources import data_dir
+from er_il.support import resources
+from er_il.support.resources import data_dir
 
 
 def test_the_checkout_comes_first():

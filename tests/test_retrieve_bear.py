@@ -7,7 +7,7 @@ import pytest
 from playing import play
 
 from er_il.spaces import make_action_space
-from sim_tasks.retrieve_bear import DISPLACED, LIFTED, RetrieveBear
+from sim_tasks.tasks.retrieve_bear import DISPLACED, LIFTED, RetrieveBear
 
 ASIDE = {
     "vase": (0.85, 0.29, 0.0),

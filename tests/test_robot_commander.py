@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from er_il import Arm, make_action_space
-from er_il.data.layout import Layout, Part
-from er_il.data.motors import Motors
-from er_il.errors import ErIlError, ShapeError, UnknownNameError
-from er_il.robot.robot_commander import RobotCommander
+from er_il.control.vector_commander import RobotCommander
+from er_il.spaces.layout import Layout, Part
+from er_il.spaces.motors import Motors
+from er_il.support.errors import ErIlError, ShapeError, UnknownNameError
 
 PANDA, XARM = Arm.preset("panda"), Arm.preset("xarm7")
 PERIOD = 0.05

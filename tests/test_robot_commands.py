@@ -18,13 +18,13 @@ from lerobot.utils.import_utils import register_third_party_plugins
 from operating import EPISODE_TIME, interrupted_after, right_arrow_after
 
 from er_il import cli
-from er_il.data.layout import Layout
-from er_il.data.schema import ACTION
-from er_il.errors import ErIlError, PolicyError, UnknownNameError
-from er_il.policy.contract import check_policy
-from er_il.policy.lerobot_env import ErIlEnvConfig
-from er_il.robot.hardware import ScriptedLeader, ScriptedLeaderConfig, SimFollower, SimFollowerConfig
-from er_il.tasks import task_id
+from er_il.envs.contract import check_policy
+from er_il.envs.lerobot_plugin import ErIlEnvConfig
+from er_il.envs.tasks import task_id
+from er_il.robots.hardware import ScriptedLeader, ScriptedLeaderConfig, SimFollower, SimFollowerConfig
+from er_il.spaces.layout import Layout
+from er_il.spaces.spec import ACTION
+from er_il.support.errors import ErIlError, PolicyError, UnknownNameError
 
 pytestmark = pytest.mark.usefixtures("quiet_logging")
 

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from er_il.errors import UnknownNameError
-from er_il.rotation import Quaternion, Rot6d, RotationError, make_rotation
+from er_il.kinematics.rotation import Quaternion, Rot6d, RotationError, make_rotation
+from er_il.support.errors import UnknownNameError
 
 HALF_TURN = np.diag([1.0, -1.0, -1.0])  # a hand that points down: where w >= 0 alone would flip
 

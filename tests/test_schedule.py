@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 from file_jobs import FileJob, InOrder, graph
 
-from er_il.schedule import ATTEMPTS, Schedule
-from er_il.workers import LocalExecutor
+from er_il.experiments.schedule import ATTEMPTS, Schedule
+from er_il.support.workers import LocalExecutor
 
 TESTS = Path(__file__).parent
 
@@ -85,8 +85,9 @@ def test_a_job_that_kills_every_worker_is_given_up(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_killed_it_resumes_where_it_was(tmp_path: Path) -> None:
     script = (
-        "import sys; from pathlib import Path; from file_jobs import FileJob; from er_il.schedule import Schedule\n"
-        "from er_il.workers import LocalExecutor\n"
+        "import sys; from pathlib import Path; from file_jobs import FileJob; "
+        "from er_il.experiments.schedule import Schedule\n"
+        "from er_il.support.workers import LocalExecutor\n"
         "if __name__ == '__main__':\n"
         "    with LocalExecutor(1) as executor:\n"
         "        Schedule([FileJob(Path(sys.argv[1]) / f'{i}.json', i, sleep=60 * (i == 2)) for i in range(4)])"

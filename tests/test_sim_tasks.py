@@ -8,10 +8,10 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import sim_tasks
-from er_il.errors import ErIlError, PlanError, RandomisationError, UnknownNameError
-from er_il.kinematics import kinematics_of
-from sim_tasks.arm_task import ArmTask
-from sim_tasks.cup_task import CupTask
+from er_il.kinematics.solver import kinematics_of
+from er_il.support.errors import ErIlError, PlanError, RandomisationError, UnknownNameError
+from sim_tasks.tasks.arm_task import ArmTask
+from sim_tasks.tasks.cup_task import CupTask
 
 IDS = [f"sim_tasks/{task.__name__}-v0" for task in sim_tasks.TASKS]
 DEMOS = 6  # a task; the benchmark of 100 is a command (README)

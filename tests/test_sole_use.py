@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from er_il.errors import ErIlError
-from er_il.sole_use import sole_use
+from er_il.support.errors import ErIlError
+from er_il.support.folder_lock import sole_use
 
 HOLDER = """
 import sys, time
 from pathlib import Path
-from er_il.sole_use import sole_use
+from er_il.support.folder_lock import sole_use
 with sole_use(Path(sys.argv[1])):
     print("in", flush=True)
     time.sleep(60)

@@ -6,10 +6,10 @@ from chains import chain_arm, write_chain
 from scipy.spatial.transform import Rotation
 
 from er_il import ActionSpace, Arm, ArmAngleFrames, Status, from_spec, make_action_space
-from er_il.errors import ArmError, ErIlError, ShapeError, SpecError, UnknownNameError
-from er_il.round_trip import EXACT, SINGULAR, UNEXPLAINED, RoundTrip, round_trips
 from er_il.spaces import name_of
+from er_il.spaces.round_trip import EXACT, SINGULAR, UNEXPLAINED, RoundTrip, round_trips
 from er_il.spaces.task import POSTURE_PULL
+from er_il.support.errors import ArmError, ErIlError, ShapeError, SpecError, UnknownNameError
 
 PANDA = Arm.preset("panda")
 

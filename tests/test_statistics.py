@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from er_il.errors import ErIlError
-from er_il.policy.statistics import exact_interval, paired_difference
+from er_il.evaluation.statistics import exact_interval, paired_difference
+from er_il.support.errors import ErIlError
 
 
 # The paper's cells with n = 10, as percentages.

@@ -11,12 +11,12 @@ from documented import documented
 
 from er_il import Arm, Status
 from er_il.cli import main
-from er_il.errors import DatasetError
-from er_il.joint_choice import choices
-from er_il.study.joint_notes import notes
-from er_il.study.prediction import predict, read_training
-from er_il.study.validity import SIZES, Cell, measure, study_validity
-from er_il.study.validity_report import report as validity_report
+from er_il.experiments.studies.joint_notes import notes
+from er_il.experiments.studies.prediction import predict, read_training
+from er_il.experiments.studies.validity import SIZES, Cell, measure, study_validity
+from er_il.experiments.studies.validity_report import report as validity_report
+from er_il.spaces.joint_choice import choices
+from er_il.support.errors import DatasetError
 
 PANDA = Arm.preset("panda")
 

@@ -5,9 +5,9 @@ import pytest
 from foreign import paths
 
 from er_il import Arm
-from er_il.data.motors import Motors
-from er_il.data.suspicion import Evidence, suspect
-from er_il.kinematics import kinematics_of
+from er_il.datasets.sanity_checks import Evidence, suspect
+from er_il.kinematics.solver import kinematics_of
+from er_il.spaces.motors import Motors
 
 PANDA, XARM = Arm.preset("panda"), Arm.preset("xarm7")
 NUMBERED = tuple(f"joint_{i}" for i in range(1, 8))

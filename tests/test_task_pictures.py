@@ -8,9 +8,9 @@ import pytest
 from documented import ROOT, documented
 from PIL import Image
 
-from er_il.data.recipe import Recipe
+from er_il.datasets.recipe import Recipe
 from sim_tasks import TASKS
-from sim_tasks.arm_task import RATE, ArmTask
+from sim_tasks.tasks.arm_task import RATE, ArmTask
 
 
 @pytest.mark.slow

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 import er_il
-from er_il.errors import DatasetError, ShapeError
-from er_il.trace import Trace
+from er_il.evaluation.trace import Trace
+from er_il.support.errors import DatasetError, ShapeError
 
 
 @pytest.fixture

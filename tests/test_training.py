@@ -10,12 +10,12 @@ from lerobot.scripts import lerobot_edit_dataset, lerobot_eval, lerobot_train
 from rich.progress import Progress
 
 from er_il import cli
-from er_il.data.recipe import Recipe
-from er_il.data.recording import generate
-from er_il.errors import DatasetError, PolicyError, UnknownNameError
+from er_il.datasets.recipe import Recipe
+from er_il.datasets.recording import generate
+from er_il.evaluation.rollouts import evaluate
 from er_il.policy.configuration import default_config, input_features
-from er_il.policy.evaluation import evaluate
 from er_il.policy.training import Training, pretrained
+from er_il.support.errors import DatasetError, PolicyError, UnknownNameError
 
 RECIPE = Recipe.load("reach_cup").resized(3)
 

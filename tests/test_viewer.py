@@ -22,15 +22,16 @@ from rich.progress import Progress
 from scipy.spatial.transform import Rotation
 
 from er_il import Arm, make_action_space
+from er_il.arms.portable import arm_spec
 from er_il.cli import USER_MISTAKE, main
-from er_il.data.portable import arm_spec
-from er_il.data.recipe import Recipe
-from er_il.data.recording import generate
-from er_il.data.schema import ACTION, DEMO_SEED, ENVIRONMENT_STATE, STATE
-from er_il.errors import ArmError, ErIlError
-from er_il.kinematics import kinematics_of
-from er_il.scene import POSE_NAMES
-from er_il.trace import Trace
+from er_il.datasets.recipe import Recipe
+from er_il.datasets.recording import generate
+from er_il.datasets.schema import DEMO_SEED, ENVIRONMENT_STATE, STATE
+from er_il.evaluation.trace import Trace
+from er_il.kinematics.solver import kinematics_of
+from er_il.spaces.spec import ACTION
+from er_il.support.errors import ArmError, ErIlError
+from er_il.support.shapes import POSE_NAMES
 from er_il.viewer import save_recording
 from er_il.viewer.arm import drawable_urdf
 from er_il.viewer.source import read_source

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import tyro
 
-from er_il.errors import ErIlError
+from er_il.support.errors import ErIlError
 
 # Command -> module under er_il.cli that holds a function of the command's name. Their heavy
 # imports (torch, MuJoCo, Rerun) wait inside the functions, so that help is instant.

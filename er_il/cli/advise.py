@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
     from rich.table import Table
 
-    from er_il.arm import Arm
-    from er_il.study.joints import Demos
+    from er_il.arms.arm import Arm
+    from er_il.experiments.studies.joints import Demos
 
 ROWS = 10  # of the table; --json has all
 
@@ -42,12 +42,12 @@ def advise(
     from rich.console import Console
 
     from er_il.cli.progress import make_progress
-    from er_il.joint_choice import choices
-    from er_il.provenance import provenance
-    from er_il.study.joints import study_joints
-    from er_il.study.joints_figure import plot as draw
-    from er_il.whole_file import write_json
-    from er_il.workers import cores
+    from er_il.experiments.studies.joints import study_joints
+    from er_il.report.joints_figure import plot as draw
+    from er_il.spaces.joint_choice import choices
+    from er_il.support.atomic_files import write_json
+    from er_il.support.provenance import provenance
+    from er_il.support.workers import cores
 
     console = Console()
     found = _arms(source, robot, episodes)
@@ -70,8 +70,8 @@ def _arms(source: str, robot: ArmOptions, episodes: int) -> "dict[str, tuple[Arm
     """Each arm by its label, and its demonstrations."""
     from dataclasses import replace
 
-    from er_il.errors import DatasetError
-    from er_il.presets import PRESETS
+    from er_il.arms.presets import PRESETS
+    from er_il.support.errors import DatasetError
 
     if source in PRESETS or (Path(source).is_file() and Path(source).suffix in (".urdf", ".xml")):
         if robot.arm or robot.arms:
@@ -81,10 +81,10 @@ def _arms(source: str, robot: ArmOptions, episodes: int) -> "dict[str, tuple[Arm
     if Path(source).suffix in (".urdf", ".xml"):
         raise DatasetError(f"There is no file {source}. Presets are {', '.join(sorted(PRESETS))}.")
 
-    from er_il.data.hub import find_dataset
-    from er_il.data.joint_paths import read_joint_paths
-    from er_il.study.demos import spread
-    from er_il.workers import cores
+    from er_il.datasets.hub import find_dataset
+    from er_il.datasets.joint_paths import read_joint_paths
+    from er_il.experiments.studies.demos import spread
+    from er_il.support.workers import cores
 
     read = read_joint_paths(find_dataset(source), wirings, cores())
     name = Path(source).resolve().name if Path(source).exists() else source
@@ -95,7 +95,7 @@ def _table(report: Mapping[str, Any]) -> "Table":
     """The best choices over the workspace and along the demonstrations, one a row."""
     from rich.table import Table
 
-    from er_il.study.joint_notes import joined, risks
+    from er_il.experiments.studies.joint_notes import joined, risks
 
     table = Table(box=None, header_style="bold")
     table.add_column("Commanded", no_wrap=True)

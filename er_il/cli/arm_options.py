@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import arg
 
 if TYPE_CHECKING:
-    from er_il.data.wiring import Wiring
+    from er_il.datasets.wiring import Wiring
 
 Names = Annotated[tuple[str, ...], arg(metavar="NAME ...")]
 Numbers = Annotated[tuple[float, ...], arg(metavar="X ...")]
@@ -41,7 +41,7 @@ class ArmOptions:
 
     def wiring(self) -> "Wiring":
         """The one arm that the options describe."""
-        from er_il.data.wiring import Wiring
+        from er_il.datasets.wiring import Wiring
 
         return Wiring(
             self.arm,
@@ -61,8 +61,8 @@ class ArmOptions:
         Raises:
             ErIlError: both an arm and a file of arms are given, or they are wrong.
         """
-        from er_il.data.wiring import read_wirings
-        from er_il.errors import DatasetError
+        from er_il.datasets.wiring import read_wirings
+        from er_il.support.errors import DatasetError
 
         if self.arms is not None and self.arm:
             raise DatasetError("Give either --arm or --arms.")

@@ -22,7 +22,7 @@ def attach(
         fps: Rate of control [Hz]; the dataset's by default.
         on_invalid: Answer to an invalid action: best_effort, hold or stop.
     """
-    from er_il.robot.attachment import attach as write_copy
+    from er_il.robots.attachment import attach as write_copy
 
     step = write_copy(policy, out, dataset=dataset, fps=fps, on_invalid=on_invalid)
     print(out)

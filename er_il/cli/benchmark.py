@@ -24,16 +24,16 @@ def benchmark(
 
     from rich.console import Console
 
-    from er_il.benchmark.grid import Grid
+    from er_il.experiments.grid import Grid
 
     asked = Grid.from_file(grid)  # seconds of imports follow: mistakes are told before
-    from er_il.benchmark.cluster import RayExecutor
-    from er_il.benchmark.page import PAGE
-    from er_il.benchmark.plan import Plan
-    from er_il.benchmark.run import run
     from er_il.cli.table import results_table
-    from er_il.sole_use import sole_use
-    from er_il.workers import LocalExecutor, cores
+    from er_il.experiments.cluster import RayExecutor
+    from er_il.experiments.plan import Plan
+    from er_il.experiments.run import run
+    from er_il.report.benchmark_page import PAGE
+    from er_il.support.folder_lock import sole_use
+    from er_il.support.workers import LocalExecutor, cores
 
     plan = Plan(asked, (out or Path("outputs/benchmark") / grid.stem).resolve())
     plan.claim()

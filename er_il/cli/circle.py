@@ -15,9 +15,9 @@ def circle(*, arm: str = "panda", out: Path = Path("outputs/circle")) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from er_il.arm import Arm
-    from er_il.showcase.circle import NAMES, drive_all, write_report
-    from er_il.showcase.circle_plot import plot
+    from er_il.arms.arm import Arm
+    from er_il.experiments.studies.circle import NAMES, drive_all, write_report
+    from er_il.report.circle_plot import plot
 
     console = Console()
     chosen = Arm.preset(arm)

@@ -30,9 +30,9 @@ def demo(
 
     from er_il.cli.progress import make_progress
     from er_il.cli.table import results_table
-    from er_il.showcase.demo import TASK, Demo
-    from er_il.showcase.report import PAGE
-    from er_il.workers import cores
+    from er_il.experiments.demo import TASK, Demo
+    from er_il.report.success import PAGE
+    from er_il.support.workers import cores
 
     folder = out or Path("outputs") / ("demo" if task == TASK else task)
     run = Demo(folder, seed, task, tuple(decoders.split(",")), rollouts, demonstrations, steps)

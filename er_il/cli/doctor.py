@@ -12,7 +12,7 @@ def doctor() -> None:
     from rich.markup import escape
     from rich.table import Table
 
-    from er_il.doctor import examine
+    from er_il.support.machine import examine
 
     console = Console(width=None if sys.stdout.isatty() else WHOLE_LINES)
     with console.status("Looking at the machine"):

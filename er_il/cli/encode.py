@@ -39,7 +39,7 @@ def encode(
 
     wirings = robot.wirings(redundant, angle_frames)  # wrong options are told before seconds of imports
 
-    from er_il.data.reencoding import reencode
+    from er_il.datasets.reencoding import reencode
 
     console = Console()
     with make_progress(console) as progress:

@@ -29,11 +29,11 @@ def eval(
     from rich.console import Console
 
     from er_il.cli.progress import make_progress
-    from er_il.policy.evaluation import evaluate
-    from er_il.policy.outcomes import tally
-    from er_il.policy.results import write_cells
+    from er_il.evaluation.results import write_cells
+    from er_il.evaluation.rollouts import evaluate
     from er_il.policy.training import pretrained
-    from er_il.provenance import provenance
+    from er_il.support.counts import tally
+    from er_il.support.provenance import provenance
 
     console = Console()
     with make_progress(console) as progress:

@@ -38,16 +38,18 @@ def generate(
     from rich.console import Console
 
     from er_il.cli.progress import make_progress
-    from er_il.data.recipe import Recipe
-    from er_il.workers import cores
+    from er_il.datasets.recipe import Recipe
+    from er_il.support.workers import cores
 
     recipe = usual = Recipe.load(task)
     if episodes is not None:
         recipe = recipe.resized(episodes)
     given = {"seed": seed, "arm": arm, "cameras": _split(cameras), "image_size": size}
     recipe = replace(recipe, **{key: value for key, value in given.items() if value is not None})
-    from er_il.data.recording import generate as generate_datasets  # seconds of imports: wrong options are told before
-    from er_il.policy.outcomes import tally
+    from er_il.datasets.recording import (
+        generate as generate_datasets,  # seconds of imports: wrong options are told before
+    )
+    from er_il.support.counts import tally
 
     name = task if recipe.arm == usual.arm else f"{task}_{recipe.arm}"
     folder = out if out is not None else Path("datasets") / name

@@ -16,12 +16,12 @@ def replay(datasets: Positional[tuple[str, ...]], *, out: Path = Path("outputs/r
     from rich.table import Table
 
     from er_il.cli.progress import make_progress
-    from er_il.data.replay import find_datasets, write_report
-    from er_il.data.replay import replay as replay_datasets
-    from er_il.errors import DatasetError
-    from er_il.policy.outcomes import tally
-    from er_il.provenance import provenance
-    from er_il.workers import cores
+    from er_il.evaluation.replay import find_datasets, write_report
+    from er_il.evaluation.replay import replay as replay_datasets
+    from er_il.support.counts import tally
+    from er_il.support.errors import DatasetError
+    from er_il.support.provenance import provenance
+    from er_il.support.workers import cores
 
     if not datasets:
         raise DatasetError("Name a dataset or a task, such as reach_cup.")

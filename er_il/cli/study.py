@@ -26,14 +26,14 @@ def joints(
     from rich.console import Console
 
     from er_il.cli.progress import make_progress
-    from er_il.provenance import provenance
-    from er_il.study.demos import study_demos
-    from er_il.study.joint_notes import training_notes
-    from er_il.study.joints import study_joints
-    from er_il.study.joints_figure import plot
-    from er_il.study.prediction import predict, read_training
-    from er_il.whole_file import write_json
-    from er_il.workers import cores
+    from er_il.experiments.studies.demos import study_demos
+    from er_il.experiments.studies.joint_notes import training_notes
+    from er_il.experiments.studies.joints import study_joints
+    from er_il.experiments.studies.prediction import predict, read_training
+    from er_il.report.joints_figure import plot
+    from er_il.support.atomic_files import write_json
+    from er_il.support.provenance import provenance
+    from er_il.support.workers import cores
 
     cells = read_training(training) if training else []
     console = Console()
@@ -73,14 +73,14 @@ def validity(
     from rich.console import Console
 
     from er_il.cli.progress import make_progress
-    from er_il.errors import ErIlError
-    from er_il.provenance import provenance
-    from er_il.study.demos import study_demos
-    from er_il.study.validity import study_validity
-    from er_il.study.validity_figure import plot
-    from er_il.study.validity_report import report as summarised
-    from er_il.whole_file import write_json
-    from er_il.workers import cores
+    from er_il.experiments.studies.demos import study_demos
+    from er_il.experiments.studies.validity import study_validity
+    from er_il.experiments.studies.validity_report import report as summarised
+    from er_il.report.validity_figure import plot
+    from er_il.support.atomic_files import write_json
+    from er_il.support.errors import ErIlError
+    from er_il.support.provenance import provenance
+    from er_il.support.workers import cores
 
     if samples < 1:
         raise ErIlError(f"{samples} samples are too few: at least one is needed.")
@@ -117,11 +117,11 @@ def deltas(
     from rich.console import Console
 
     from er_il.cli.progress import make_progress
-    from er_il.provenance import provenance
-    from er_il.study.deltas import study_deltas
-    from er_il.study.demos import study_demos
-    from er_il.whole_file import write_json
-    from er_il.workers import cores
+    from er_il.experiments.studies.deltas import study_deltas
+    from er_il.experiments.studies.demos import study_demos
+    from er_il.support.atomic_files import write_json
+    from er_il.support.provenance import provenance
+    from er_il.support.workers import cores
 
     console = Console()
     with make_progress(console) as progress:

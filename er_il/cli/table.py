@@ -5,7 +5,7 @@ from typing import Any
 
 from rich.table import Table
 
-from er_il.policy.outcomes import tally
+from er_il.support.counts import tally
 
 
 def results_table(cells: Sequence[Mapping[str, Any]]) -> Table:

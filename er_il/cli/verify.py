@@ -34,12 +34,12 @@ def verify(dataset: Positional[str], *, out: Path | None = None) -> None:
     from rich.table import Table
 
     from er_il.cli.progress import make_progress
-    from er_il.data.hub import find_dataset
-    from er_il.data.verification import verify as verify_dataset
-    from er_il.data.verification_plot import plot
-    from er_il.errors import DatasetError
-    from er_il.provenance import provenance
-    from er_il.workers import cores
+    from er_il.datasets.hub import find_dataset
+    from er_il.datasets.verification import verify as verify_dataset
+    from er_il.report.verification_plot import plot
+    from er_il.support.errors import DatasetError
+    from er_il.support.provenance import provenance
+    from er_il.support.workers import cores
 
     folder = find_dataset(dataset)
     console = Console()

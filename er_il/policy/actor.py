@@ -14,12 +14,12 @@ from lerobot.envs import preprocess_observation
 from lerobot.policies import PreTrainedPolicy, make_policy, make_pre_post_processors
 from lerobot.utils.constants import OBS_IMAGES
 
-from er_il.command import BEST_EFFORT
-from er_il.errors import PolicyError
-from er_il.policy.contract import NONE, check_policy, policy_contract
-from er_il.policy.decoders import decoder
-from er_il.policy.lerobot_env import ErIlEnvConfig
-from er_il.rotation import Quaternion
+from er_il.control.commander import BEST_EFFORT
+from er_il.envs.contract import NONE, check_policy, policy_contract
+from er_il.envs.decoders import decoder
+from er_il.envs.lerobot_plugin import ErIlEnvConfig
+from er_il.kinematics.rotation import Quaternion
+from er_il.support.errors import PolicyError
 
 # Matrix products of another shape round differently, and contact amplifies the last bit into another
 # outcome. So the policy always sees this many rows, the missing ones filled up: then an episode's

@@ -6,10 +6,10 @@ from typing import Any
 
 import yaml
 
-from er_il.data.schema import IMAGES
-from er_il.errors import PolicyError
-from er_il.resources import data_dir
+from er_il.datasets.schema import IMAGES
 from er_il.spaces import split_name
+from er_il.support.errors import PolicyError
+from er_il.support.resources import data_dir
 
 
 def default_config(space: str, kind: str = "") -> Path:

@@ -12,14 +12,14 @@ from typing import IO, Any
 
 import yaml
 
-from er_il.data.recipe import TRAIN
-from er_il.data.schema import action_spec
-from er_il.errors import DatasetError, PolicyError
+from er_il.datasets.recipe import TRAIN
+from er_il.envs.contract import Contract, dataset_info
 from er_il.policy.configuration import input_features, named_inputs
-from er_il.policy.contract import Contract, dataset_info
 from er_il.spaces import check_space, split_name
-from er_il.whole_file import write_whole
-from er_il.workers import end_with_parent
+from er_il.spaces.spec import action_spec
+from er_il.support.atomic_files import write_whole
+from er_il.support.errors import DatasetError, PolicyError
+from er_il.support.workers import end_with_parent
 
 STOCK = "lerobot-train"
 IN_MEMORY = "er_il.policy.in_memory"  # the same, in less time

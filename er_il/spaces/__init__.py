@@ -5,16 +5,17 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
-from er_il.arm import Arm, Vector
-from er_il.errors import ArmError, SpecError, UnknownNameError
-from er_il.kinematics import kinematics_of
-from er_il.rotation import Quaternion, RotationCode, make_rotation
-from er_il.spaces.base import SPEC_VERSION, ActionSpace, Decoded
+from er_il.arms.arm import Arm, Vector
+from er_il.kinematics.rotation import Quaternion, RotationCode, make_rotation
+from er_il.kinematics.solver import kinematics_of
+from er_il.spaces.base import ActionSpace, Decoded
 from er_il.spaces.delta import PREFIX, DeltaBounds, DeltaSpace, make_delta_space
 from er_il.spaces.era import EraSpace
 from er_il.spaces.erj import ErjSpace
 from er_il.spaces.joint import JointSpace
+from er_il.spaces.spec import SPEC_VERSION
 from er_il.spaces.task import TaskSpace
+from er_il.support.errors import ArmError, SpecError, UnknownNameError
 
 __all__ = [
     "SPACES",

@@ -7,12 +7,12 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from er_il.arm import Arm, Vector
-from er_il.errors import ShapeError
-from er_il.kinematics import Kinematics, Status, kinematics_of
+from er_il.arms.arm import Arm, Vector
+from er_il.kinematics.solver import Kinematics, Status, kinematics_of
+from er_il.spaces.spec import SPEC_VERSION
+from er_il.support.errors import ShapeError
 
 Array = NDArray[np.float64]
-SPEC_VERSION = 1
 
 
 @dataclass(frozen=True)

@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from er_il.arm import Vector
-from er_il.errors import BoundsError, ShapeError
-from er_il.kinematics import Status
+from er_il.arms.arm import Vector
+from er_il.kinematics.solver import Status
 from er_il.spaces.base import ActionSpace, Array, Decoded
 from er_il.spaces.pose import PoseSpace
+from er_il.support.errors import BoundsError, ShapeError
 
 PREFIX = "delta_"  # of the space's name in a spec
 POSE_NAMES = ("ee.dx", "ee.dy", "ee.dz", "ee.drx", "ee.dry", "ee.drz")

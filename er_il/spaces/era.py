@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from er_il.arm import Vector
-from er_il.arm_angle import wrapped
-from er_il.kinematics import IkResult
+from er_il.arms.arm import Vector
+from er_il.kinematics.arm_angle import wrapped
+from er_il.kinematics.solver import IkResult
 from er_il.spaces.base import Array
 from er_il.spaces.pose import PoseSpace
 
@@ -18,7 +18,7 @@ class EraSpace(PoseSpace):
     """The end-effector pose and the arm angle [rad], 0 where the elbow is highest.
 
     Along a trajectory the angle is unwrapped; the first takes the turn nearest to ``reference``.
-    Decoding takes any turn. See :mod:`er_il.arm_angle` for the geometry and where it has no meaning.
+    Decoding takes any turn. See :mod:`er_il.kinematics.arm_angle` for the geometry and where it has no meaning.
     """
 
     reference: float  # [rad]

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from er_il.arm import Vector
-from er_il.kinematics import LIMIT_MARGIN, Status
+from er_il.arms.arm import Vector
+from er_il.kinematics.solver import LIMIT_MARGIN, Status
 from er_il.spaces.base import ActionSpace, Array, Decoded
 
 

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from er_il.arm import Vector
-from er_il.kinematics import IkResult, Kinematics, Status, kinematics_of
-from er_il.rotation import Quaternion, RotationCode, RotationError
+from er_il.arms.arm import Vector
+from er_il.kinematics.rotation import Quaternion, RotationCode, RotationError
+from er_il.kinematics.solver import IkResult, Kinematics, Status, kinematics_of
 from er_il.spaces.base import ActionSpace, Array, Decoded
 
 POSITION_NAMES = ("ee.x", "ee.y", "ee.z")
@@ -20,7 +20,7 @@ EASED = (0.5, 0.2, 0.1, 0.0)  # shares of the way to a redundancy value that is 
 class PoseSpace(ActionSpace):
     """Position [m] and rotation of the end effector in the base frame, then redundancy values [rad].
 
-    ``damped`` says how IK steps (see :mod:`er_il.search`); it is no part of what an action means.
+    ``damped`` says how IK steps (see :mod:`er_il.kinematics.search`); it is no part of what an action means.
     """
 
     rotation: RotationCode
@@ -44,7 +44,7 @@ class PoseSpace(ActionSpace):
         """Find joint angles with that pose (4, 4) and those redundancy values, near the seed (n,)."""
 
     def conditioning(self, q: ArrayLike) -> float:
-        """Distance of q (n,) [rad] from a singularity: see :meth:`er_il.kinematics.Kinematics.conditioning`."""
+        """Distance of q (n,) [rad] from a singularity: see :meth:`er_il.kinematics.solver.Kinematics.conditioning`."""
         return self.kinematics.conditioning(q)
 
     @property

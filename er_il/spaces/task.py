@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er_il.arm import Vector
-from er_il.kinematics import IkResult
+from er_il.arms.arm import Vector
+from er_il.kinematics.solver import IkResult
 from er_il.spaces.base import Array
 from er_il.spaces.pose import PoseSpace
 

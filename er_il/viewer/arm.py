@@ -9,10 +9,10 @@ import numpy as np
 import rerun as rr
 from rerun.urdf import UrdfJoint, UrdfTree
 
-from er_il.arm import Arm
-from er_il.kinematics import kinematics_of
-from er_il.trace import Array
-from er_il.urdf import find_mesh
+from er_il.arms.arm import Arm
+from er_il.arms.urdf import find_mesh
+from er_il.evaluation.trace import Array
+from er_il.kinematics.solver import kinematics_of
 
 ARM = "arm"
 BONES = f"{ARM}/bones"  # of an arm without shapes, as those that travel with their data

@@ -6,7 +6,7 @@ from typing import Any
 
 import pyarrow.dataset as pads
 
-from er_il.data.rewriting import EPISODE
+from er_il.datasets.rewriting import EPISODE
 
 DATA, EPISODES = "data", "meta/episodes"
 

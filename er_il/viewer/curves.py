@@ -7,9 +7,9 @@ import numpy as np
 import rerun as rr
 from scipy.spatial.transform import Rotation
 
-from er_il.kinematics import Status
+from er_il.evaluation.trace import Array, Trace
+from er_il.kinematics.solver import Status
 from er_il.spaces import ActionSpace
-from er_il.trace import Array, Trace
 
 JOINTS, END_EFFECTOR, REDUNDANCY, ACTION = GROUPS = ("joints", "end_effector", "redundancy", "action")
 STATUS = "status"

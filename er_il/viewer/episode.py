@@ -5,15 +5,15 @@ from pathlib import Path
 import numpy as np
 from lerobot.datasets.utils import DatasetInfo
 
-from er_il.data.decoding import decode_episode
-from er_il.data.encoding import dataset_info, dataset_layout, joints_column, read_episodes
-from er_il.data.layout import Layout, Part
-from er_il.data.portable import arm_spec
-from er_il.data.rewriting import episode_slices, read_episode_numbers, read_vectors
-from er_il.data.schema import DEMO_SEED, ENVIRONMENT_STATE, STATE, dimension_names
-from er_il.errors import DatasetError, UnknownNameError
+from er_il.arms.portable import arm_spec
+from er_il.datasets.decoding import decode_episode
+from er_il.datasets.encoding import dataset_info, dataset_layout, joints_column, read_episodes
+from er_il.datasets.rewriting import episode_slices, read_episode_numbers, read_vectors
+from er_il.datasets.schema import DEMO_SEED, ENVIRONMENT_STATE, STATE, dimension_names
+from er_il.evaluation.trace import Array, Trace
 from er_il.spaces import JointSpace
-from er_il.trace import Array, Trace
+from er_il.spaces.layout import Layout, Part
+from er_il.support.errors import DatasetError, UnknownNameError
 from er_il.viewer.column import DATA, read_rows
 from er_il.viewer.video import read_images
 

@@ -5,11 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 import rerun as rr
 
-from er_il.data.portable import arm_from_spec
-from er_il.kinematics import Status
-from er_il.scene import Shape
+from er_il.arms.portable import arm_from_spec
+from er_il.evaluation.trace import Trace
+from er_il.kinematics.solver import Status
 from er_il.spaces import from_spec
-from er_il.trace import Trace
+from er_il.support.shapes import Shape
 from er_il.viewer.arm import log_arm
 from er_il.viewer.blueprint import ABOUT, FRAME, TIME, blueprint
 from er_il.viewer.curves import curves_of, log_curves, log_path, log_status

@@ -8,13 +8,13 @@ from urllib.parse import quote
 
 import rerun as rr
 
-from er_il.display import has_display
-from er_il.errors import ErIlError
-from er_il.scene import Shape
-from er_il.trace import Trace
+from er_il.evaluation.trace import Trace
+from er_il.support.atomic_files import write_whole
+from er_il.support.display import has_display
+from er_il.support.errors import ErIlError
+from er_il.support.shapes import Shape
 from er_il.viewer.recording import log_episode, open_recording
 from er_il.viewer.source import shapes_of
-from er_il.whole_file import write_whole
 
 SUFFIX = ".rrd"  # by which Rerun knows its files
 GRPC_PORT, WEB_PORT = 9876, 9090  # Rerun's own

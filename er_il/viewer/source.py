@@ -7,11 +7,11 @@ from typing import Any
 
 import gymnasium
 
-from er_il.data.record import RECORD, Record
-from er_il.errors import DatasetError
-from er_il.scene import Shape
-from er_il.tasks import task_id, task_names
-from er_il.trace import SUFFIX, Trace
+from er_il.datasets.record import RECORD, Record
+from er_il.envs.tasks import task_id, task_names
+from er_il.evaluation.trace import SUFFIX, Trace
+from er_il.support.errors import DatasetError
+from er_il.support.shapes import Shape
 
 
 def read_source(source: Path, episode: int | None = None, arm: str = "") -> tuple[Trace, list[Shape]]:

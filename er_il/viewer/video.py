@@ -9,8 +9,8 @@ from lerobot.datasets.video_utils import decode_video_frames
 from numpy.typing import NDArray
 from PIL import Image
 
-from er_il.data.schema import IMAGES
-from er_il.errors import DatasetError
+from er_il.datasets.schema import IMAGES
+from er_il.support.errors import DatasetError
 from er_il.viewer.column import DATA, EPISODES, read_rows
 
 Frames = NDArray[np.uint8]  # (T, height, width, 3) RGB

@@ -8,8 +8,8 @@ import rerun as rr
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
-from er_il.scene import Shape, object_poses
-from er_il.trace import Trace
+from er_il.evaluation.trace import Trace
+from er_il.support.shapes import Shape, object_poses
 
 SCENE = "scene"
 CAMERAS = "cameras"

@@ -1,0 +1,1 @@
+"""From an action to a command that the arm can follow."""

@@ -1,1 +1,0 @@
-"""LeRobot datasets: recording, re-encoding, verifying and replaying them."""

@@ -1,0 +1,1 @@
+"""LeRobot datasets: recorded, re-encoded, verified."""

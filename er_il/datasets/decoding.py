@@ -1,0 +1,108 @@
+"""Decoding whole episodes of encoded vectors, several episodes at a time."""
+
+import functools
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from er_il.kinematics.solver import Status
+from er_il.spaces.layout import Layout
+from er_il.spaces.pose import PoseSpace
+from er_il.support.workers import worker_pool
+
+Array = NDArray[np.float64]
+
+FEW_FRAMES = 4000  # fewer are decoded sooner than worker processes start
+
+
+@dataclass(frozen=True, eq=False)
+class Episode:
+    """T encoded vectors, and what is known about the joints meanwhile."""
+
+    number: int
+    actions: Array  # (T, layout's encoded dimensions)
+    state: Array | None = None  # (T, D) measured joint vectors; NaN where nothing was measured
+    truth: Array | None = None  # (T, D) the joint vectors that were encoded
+
+
+@dataclass(frozen=True, eq=False)
+class DecodedEpisode:
+    """What became of an episode of T vectors for P arms."""
+
+    vectors: Array  # (T, D)
+    status: NDArray[np.str_]  # (T, P) of er_il.Status
+    position_error: Array  # (T, P) [m] of the pose
+    rotation_error: Array  # (T, P) [rad]
+    conditioning: Array  # (T, P) smallest singular value, see Kinematics.conditioning; infinite in joint space
+
+
+def decode_episode(layout: Layout, episode: Episode) -> DecodedEpisode:
+    """Decode an episode in time order.
+
+    Seeds are the measured joints, as on a robot; without them the joint vector of the step before.
+    """
+    length, parts = len(episode.actions), len(layout.parts)
+    result = DecodedEpisode(
+        np.empty((length, len(layout.names))),
+        np.full((length, parts), Status.OK, dtype="U16"),
+        np.zeros((length, parts)),
+        np.zeros((length, parts)),
+        np.full((length, parts), np.inf),
+    )
+    last = home_vector(layout) if episode.truth is None else episode.truth[0]
+    if episode.truth is None and episode.state is not None:
+        last = episode.state[0]
+    for t, action in enumerate(episode.actions):
+        decoded = layout.decode(action, last if episode.state is None else episode.state[t], last)
+        result.vectors[t] = decoded.vector
+        last = decoded.vector if episode.truth is None else episode.truth[t]
+        for p, (part, arm) in enumerate(zip(layout.parts, decoded.parts, strict=True)):
+            result.status[t, p] = arm.status
+            result.position_error[t, p], result.rotation_error[t, p] = arm.pos_err, arm.rot_err
+            if isinstance(part.space, PoseSpace):
+                result.conditioning[t, p] = part.space.conditioning(layout.angles(part, last))
+    return result
+
+
+def decode_episodes(
+    layout: Layout, episodes: Sequence[Episode], workers: int, advance: Callable[[int], object] = lambda frames: None
+) -> list[DecodedEpisode]:
+    """Decode episodes, in worker processes if they are long; ``advance`` is told how many frames are done."""
+    frames = sum(len(episode.actions) for episode in episodes)
+    decoded = []
+    for result in _results(layout, episodes, workers if frames > FEW_FRAMES else 1):
+        decoded.append(result)
+        advance(len(result.vectors))
+    return decoded
+
+
+def home_vector(layout: Layout) -> Array:
+    """The joint vector (D,) of all arms at home, zero elsewhere."""
+    vector = np.zeros(len(layout.names))
+    for part in layout.parts:
+        vector[layout.indices(part)] = part.motors.values(part.space.arm.home)
+    return vector
+
+
+def _results(layout: Layout, episodes: Sequence[Episode], workers: int) -> Iterator[DecodedEpisode]:
+    if workers <= 1:
+        yield from map(functools.partial(decode_episode, layout), episodes)
+    else:
+        with worker_pool(workers, _prepare, layout.spec()) as pool:
+            yield from pool.map(_decode, episodes)
+
+
+_layout: Layout | None = None  # of a worker process
+
+
+def _prepare(spec: Mapping[str, Any]) -> None:
+    global _layout
+    _layout = Layout.from_spec(spec)
+
+
+def _decode(episode: Episode) -> DecodedEpisode:
+    assert _layout is not None
+    return decode_episode(_layout, episode)

@@ -1,0 +1,28 @@
+"""Datasets by name: folders, or LeRobot's repository ids, which LeRobot itself looks up and downloads."""
+
+from pathlib import Path
+
+import httpx
+from lerobot.datasets import LeRobotDataset
+
+from er_il.support.errors import DatasetError
+
+
+def find_dataset(source: str) -> Path:
+    """Folder of a dataset.
+
+    Args:
+        source: A folder, or a repository id such as ``lerobot/pusht``.
+
+    Raises:
+        DatasetError: there is no such dataset, or it cannot be downloaded.
+    """
+    folder = Path(source)
+    if folder.exists() or folder.is_absolute() or source.count("/") != 1:
+        return folder  # whoever reads it says what is wrong with it
+    try:
+        return Path(LeRobotDataset(source, video_backend="pyav").root)
+    # huggingface_hub's own errors are OSErrors and ValueErrors; without a network, its client's come through.
+    except (OSError, ValueError, NotImplementedError, httpx.HTTPError) as error:
+        reason = (str(error).strip() or type(error).__name__).splitlines()[0]
+        raise DatasetError(f"{source} is neither a folder nor a dataset that LeRobot can load: {reason}") from error

@@ -1,0 +1,47 @@
+"""The joint angles in a dataset, arm by arm and episode by episode, whatever its action space."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from er_il.datasets.decoding import decode_episodes
+from er_il.datasets.encoding import dataset_info, dataset_layout, joints_column, read_episodes
+from er_il.datasets.joint_path import ArmPaths, JointPath
+from er_il.datasets.wiring import Wiring, wire
+from er_il.spaces.spec import ACTION, SPEC
+from er_il.support.errors import DatasetError
+
+
+def read_joint_paths(dataset: Path, wirings: Sequence[Wiring] = (), workers: int = 1) -> list[ArmPaths]:
+    """Read the joint angles of each arm of a dataset.
+
+    Args:
+        dataset: Folder of the dataset.
+        wirings: The arms of a dataset that does not know them.
+        workers: Processes that decode, where the joints were not kept beside the encoded actions.
+
+    Raises:
+        ErIlError: it is no dataset, or does not say which arm it is of and nor do the wirings.
+    """
+    info = dataset_info(dataset)
+    described = SPEC in (info.features[ACTION].get("info") or {})
+    if not described and not wirings:
+        raise DatasetError(f"{dataset} does not say which arm it is of: give --arm, and --joints for its joints.")
+    layout = dataset_layout(info.features) if described else wire(wirings, info.features, "joint", "quat")
+    truth = joints_column(info.features, layout)
+    episodes = read_episodes(dataset, info, layout, truth)
+    if truth is None:
+        vectors = [decoded.vectors for decoded in decode_episodes(layout, episodes, workers)]
+    else:
+        vectors = [np.asarray(episode.truth) for episode in episodes]
+    found = []
+    for part in layout.parts:
+        paths = []
+        for episode, vector in zip(episodes, vectors, strict=True):
+            commanded = layout.angles(part, vector)
+            before = np.concatenate([commanded[:1], commanded[:-1]])
+            measured = before if episode.state is None else layout.angles(part, episode.state)
+            paths.append(JointPath(episode.number, commanded, measured))
+        found.append(ArmPaths(part.label, part.space.arm, tuple(paths)))
+    return found

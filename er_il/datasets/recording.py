@@ -1,0 +1,188 @@
+"""Generating datasets: demos are recorded once and written as one LeRobot v3 dataset a space."""
+
+import errno
+import json
+import os
+import shutil
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import av.logging
+import gymnasium
+import numpy as np
+from lerobot.datasets import LeRobotDataset
+from lerobot.datasets.io_utils import write_info
+from lerobot.utils.utils import SuppressProgressBars
+from rich.progress import Progress
+
+from er_il.arms.arm import Arm
+from er_il.datasets.demos import Demo, collect, demo_path, make_world
+from er_il.datasets.encoding import encode_dataset
+from er_il.datasets.normalisation import loosen_rotations, set_scales
+from er_il.datasets.recipe import Recipe
+from er_il.datasets.record import Record
+from er_il.datasets.schema import DEMO_SEED, ENVIRONMENT_STATE, IMAGES, LEADER_JOINTS, STATE, features
+from er_il.spaces import ActionSpace, check_space, make_action_space
+from er_il.spaces.layout import Layout
+from er_il.spaces.spec import ACTION
+from er_il.support.errors import DatasetError
+
+# LeRobot's encoder drops frames when its queue is full, as a live camera's must be; ours can wait.
+_QUEUE_SIZE = 1_000_000
+
+
+@dataclass(frozen=True)
+class Generated:
+    """The datasets of one recipe."""
+
+    paths: dict[str, Path]  # space -> dataset, as asked for
+    new: tuple[str, ...]  # spaces that this call wrote; empty if all were there
+    dropped: dict[int, str]  # demo seed -> why it is not in the datasets
+
+
+def generate(recipe: Recipe, spaces: Sequence[str], out: Path, progress: Progress, workers: int) -> Generated:
+    """Record a recipe's demos and write one dataset a space into ``out``.
+
+    Interrupted at any point, the same call resumes. Datasets that exist are left alone; only what
+    is missing is added.
+
+    Args:
+        recipe: What to record.
+        spaces: Kinds of action space; they name the datasets' folders.
+        out: Folder of the datasets. Finished demos wait beside it, in ``<out>.partial``.
+        progress: Where to show progress.
+        workers: Number of worker processes.
+
+    Raises:
+        UnknownNameError: unknown task, space, arm or camera.
+        DatasetError: another recipe's data is there, most demos fail, or the folder cannot be written.
+    """
+    asked = tuple(dict.fromkeys(spaces))
+    for space in asked or ("",):
+        check_space(space)
+        make_action_space(space, Arm.preset(recipe.arm))  # raises if the arm has none such
+    datasets = {info.parents[1].name for info in out.glob("*/meta/info.json")}
+    existing = sorted(datasets | {space for space in asked if (out / space).exists()})
+    for space in existing:
+        _check_same(recipe, Record.read(out / space).recipe, out / space)
+    new = tuple(space for space in asked if space not in existing)
+    work = out.with_name(out.name + ".partial")
+    with _writing_to(out), SuppressProgressBars():
+        first = out / (existing or new)[0]
+        if not existing:
+            _record(recipe, new[0], first, work, progress, workers)
+        if missing := [space for space in new if out / space != first]:
+            for space in progress.track(missing, description="Encode in the other spaces"):
+                encode_dataset(first, out / space, Layout.of_space(make_action_space(space, Arm.preset(recipe.arm))))
+        shutil.rmtree(work, ignore_errors=True)
+    return Generated({space: out / space for space in asked}, new, Record.read(first).dropped)
+
+
+def _record(recipe: Recipe, kind: str, target: Path, work: Path, progress: Progress, workers: int) -> None:
+    """Collect the demos and write the first dataset from them."""
+    world = make_world(recipe)
+    try:
+        world.reset(seed=0)  # what cannot be rendered shows here, not in a worker
+        space = make_action_space(kind, Arm.preset(recipe.arm))
+        dropped: dict[int, str] = {}
+        demos = _claim(work, recipe)
+        writer = _Writer(recipe, world, space, work / "dataset")
+        bar = progress.add_task(f"Record {recipe.task}", total=recipe.episodes)
+        for seed, reason in collect(recipe, demos, workers):
+            if reason:
+                dropped[seed] = reason
+                progress.update(bar, description=f"Record {recipe.task} ({len(dropped)} dropped)")
+            else:
+                writer.add(Demo.load(demo_path(demos, seed)))
+                progress.advance(bar)
+        writer.finish(dropped)
+    finally:
+        world.close()
+    target.parent.mkdir(parents=True, exist_ok=True)
+    (work / "dataset").rename(target)
+
+
+class _Writer:
+    """Writes demos as a LeRobot dataset."""
+
+    def __init__(self, recipe: Recipe, world: gymnasium.Env[Any, Any], space: ActionSpace, root: Path) -> None:
+        # Without LeRobot's footers, which it writes at the end, an interrupted dataset is unreadable.
+        shutil.rmtree(root, ignore_errors=True)
+        self._recipe, self._space = recipe, space
+        os.environ.setdefault("SVT_LOG", "1")  # errors only: the encoders would bury the progress bar
+        av.logging.set_libav_level(av.logging.ERROR)
+        unwrapped: Any = world.unwrapped
+        self._description: str = unwrapped.task_description
+        self._dataset = LeRobotDataset.create(
+            repo_id=f"er_il/{recipe.task}",
+            root=root,
+            fps=world.metadata["render_fps"],
+            features=features(
+                space,
+                unwrapped.state_names,
+                unwrapped.environment_state_names,
+                recipe.cameras,
+                recipe.image_size,
+            ),
+            robot_type=space.arm.name,
+            video_backend="pyav",
+            streaming_encoding=True,
+            encoder_queue_maxsize=_QUEUE_SIZE,
+        )
+
+    def add(self, demo: Demo) -> None:
+        actions = Layout.of_space(self._space).encode(demo.joints).astype(np.float32)
+        for step in range(len(demo)):
+            frame = {
+                ACTION: actions[step],
+                STATE: demo.state[step],
+                ENVIRONMENT_STATE: demo.environment_state[step],
+                LEADER_JOINTS: demo.joints[step],
+                DEMO_SEED: np.array([demo.seed]),
+                "task": self._description,
+            }
+            self._dataset.add_frame(frame | {IMAGES + name: images[step] for name, images in demo.images.items()})
+        self._dataset.save_episode()
+
+    def finish(self, dropped: dict[int, str]) -> None:
+        self._dataset.finalize()
+        info = self._dataset.meta.info
+        info.splits = self._recipe.splits
+        write_info(info, self._dataset.root)
+        set_scales(self._dataset.root)
+        loosen_rotations(self._dataset.root)
+        Record(self._recipe, dropped).write(self._dataset.root)
+
+
+def _claim(work: Path, recipe: Recipe) -> Path:
+    """Return the folder of finished demos, which belongs to one recipe."""
+    demos, owner = work / "demos", work / "recipe.json"
+    if owner.exists():
+        _check_same(recipe, Recipe.from_file(owner), work)
+    demos.mkdir(parents=True, exist_ok=True)
+    owner.write_text(json.dumps(recipe.to_dict()))
+    return demos
+
+
+def _check_same(asked: Recipe, found: Recipe, where: Path) -> None:
+    if difference := asked.differences(found):
+        raise DatasetError(
+            f"{where} holds another recipe's data; asked for is {difference}. Choose another --out, or delete it."
+        )
+
+
+@contextmanager
+def _writing_to(out: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        reason = os.strerror(error.errno) if error.errno else error
+        raise DatasetError(f"Cannot write to {out}: {reason}.") from error
+    except RuntimeError as error:
+        full = os.strerror(errno.ENOSPC)
+        if full not in str(error):  # all that LeRobot's encoder threads pass on is the text
+            raise
+        raise DatasetError(f"Cannot write to {out}: {full}.") from error

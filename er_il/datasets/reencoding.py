@@ -1,0 +1,87 @@
+"""Re-encoding as a user asks for it: any LeRobot dataset by name, with or without a specification."""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from er_il.datasets import card
+from er_il.datasets.encoding import dataset_info, dataset_layout, decode_dataset, encode_dataset, joints_column
+from er_il.datasets.hub import find_dataset
+from er_il.datasets.wiring import Wiring, wire
+from er_il.spaces import JointSpace
+from er_il.spaces.layout import Layout
+from er_il.spaces.spec import ACTION, SPEC
+from er_il.support.errors import DatasetError
+
+
+@dataclass(frozen=True)
+class Reencoded:
+    """A dataset that was written."""
+
+    layout: Layout  # of its actions
+    statuses: Counter[str]  # decoded commands by er_il.Status; empty if nothing had to be decoded
+
+
+def reencode(
+    source: str,
+    target: Path,
+    kind: str,
+    *,
+    rotation: str,
+    wirings: Sequence[Wiring],
+    keep: bool,
+    on_progress: Callable[[int, int], object],
+) -> Reencoded:
+    """Write a dataset again with its actions in another action space.
+
+    Where the source is encoded, joint space is reached through the decoder, and other spaces from
+    the joint vectors that it kept, or through the decoder if it kept none.
+
+    Args:
+        source: Folder, or repository id.
+        target: Folder that does not exist.
+        kind: See :func:`er_il.spaces.make_action_space`.
+        rotation: ``quat`` or ``rot6d``.
+        wirings: The arms of a dataset that does not know them.
+        keep: Keep the joint vectors beside the encoded actions.
+        on_progress: Called with the number of frames done, and their total.
+
+    Raises:
+        ErIlError: the dataset, the arms or the space do not fit.
+        FileExistsError: the target exists.
+    """
+    folder = find_dataset(source)
+    info = dataset_info(folder)
+    described = SPEC in (info.features[ACTION].get("info") or {})
+    if described and wirings:
+        raise DatasetError(f"{source} says which arms it is of: leave out --arm and --arms.")
+    if not described and not wirings:
+        raise DatasetError(f"{source} does not say which arm it is of: give --arm, and --joints for its joints.")
+    if described:
+        layout = dataset_layout(info.features).in_space(kind, rotation)
+    else:
+        layout = wire(wirings, info.features, kind, rotation)
+    encoded = described and info.features[ACTION]["info"][SPEC]["space"] != JointSpace.kind
+    decode = encoded and (kind == JointSpace.kind or joints_column(info.features, layout) is None)
+    done, total = 0, info.total_frames
+
+    def advance(frames: int) -> None:
+        nonlocal done
+        done += frames
+        on_progress(done, total)
+
+    def finish(partial: Path) -> None:
+        written = dataset_info(partial)
+        options: dict[str, Any] = {"to": kind, "rotation": rotation, "decoded": decode}
+        name = folder.resolve().name if Path(source).exists() else source  # not where it lies on this machine
+        card.sign(partial, written, dataset_layout(written.features), name, options)
+
+    statuses: Counter[str] = Counter()
+    if decode:
+        decoded = decode_dataset(folder, target, layout, finish=finish, advance=advance)
+        statuses.update(status for episode in decoded for status in episode.status.ravel().tolist())
+    else:
+        encode_dataset(folder, target, layout, keep=keep, fit=True, finish=finish, advance=advance)
+    return Reencoded(dataset_layout(dataset_info(target).features), statuses)

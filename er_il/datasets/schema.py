@@ -1,0 +1,57 @@
+"""The columns of er_il's datasets, in LeRobot's terms (the card ``datasets/README.md`` explains them)."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from er_il.spaces import ActionSpace
+from er_il.spaces.layout import Layout
+from er_il.spaces.spec import ACTION, SPEC
+
+STATE = "observation.state"
+ENVIRONMENT_STATE = "observation.environment_state"
+IMAGES = "observation.images."
+# Side columns. LeRobot makes every action* column a policy output and every observation* column an input.
+LEADER_JOINTS = "leader.joints"
+DEMO_SEED = "demo.seed"
+SOURCE_ACTION = "source.action"  # in a dataset re-encoded from another: its actions as they were
+
+Feature = dict[str, Any]
+
+
+def features(
+    space: ActionSpace,
+    state_names: tuple[str, ...],
+    environment_state_names: tuple[str, ...],
+    cameras: tuple[str, ...],
+    image_size: int,
+) -> dict[str, Feature]:
+    """Describe the columns of a dataset of demos, for ``LeRobotDataset.create``."""
+    joint_names = tuple(f"{joint}.pos" for joint in space.arm.joints)
+    image = {"dtype": "video", "shape": (image_size, image_size, 3), "names": ["height", "width", "channels"]}
+    return {
+        ACTION: action_feature(Layout.of_space(space)),
+        STATE: _vector(state_names),
+        ENVIRONMENT_STATE: _vector(environment_state_names),
+        LEADER_JOINTS: _vector((*joint_names, "gripper")),
+        DEMO_SEED: {"dtype": "int64", "shape": (1,), "names": None},
+        **{IMAGES + camera: dict(image) for camera in cameras},
+    }
+
+
+def action_feature(layout: Layout) -> Feature:
+    """Describe the action column of a layout; its specification travels in ``info``."""
+    return _vector(layout.encoded_names) | {"info": {SPEC: layout.spec()}}
+
+
+def dimension_names(feature: Feature) -> tuple[str, ...]:
+    """Names of a column's dimensions; their numbers if it names none."""
+    names = feature.get("names")
+    if isinstance(names, Mapping):  # such as {"motors": [...]}, which older datasets have
+        names = [name for group in names.values() for name in group]
+    count = math.prod(feature["shape"])
+    return tuple(map(str, names)) if names and len(names) == count else tuple(map(str, range(count)))
+
+
+def _vector(names: tuple[str, ...]) -> Feature:
+    return {"dtype": "float32", "shape": (len(names),), "names": list(names)}

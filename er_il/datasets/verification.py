@@ -1,0 +1,215 @@
+"""Verification: whether an encoded dataset gives its joint vectors back, and whether they are this arm's."""
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from er_il.datasets.decoding import DecodedEpisode, Episode, decode_episodes
+from er_il.datasets.encoding import dataset_info, dataset_layout, joints_column, read_episodes
+from er_il.datasets.rewriting import read_vectors
+from er_il.datasets.sanity_checks import Evidence, suspect
+from er_il.datasets.schema import STATE, Feature, dimension_names
+from er_il.kinematics.rotation import Quaternion
+from er_il.kinematics.solver import LIMIT_MARGIN, Status
+from er_il.spaces.joint_choice import stretches
+from er_il.spaces.layout import Layout
+from er_il.spaces.pose import PoseSpace
+from er_il.spaces.round_trip import SINGULAR
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+PERCENTILES = (50, 95, 99, 100)
+POSITION_NAMES = ("ee.x", "ee.y", "ee.z")
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Consecutive frames of an episode in which an arm is near a singularity."""
+
+    episode: int
+    arm: str
+    first: int
+    last: int
+    smallest: float  # smallest singular value, metres and radians mixed
+
+
+@dataclass(frozen=True, eq=False)
+class Checked:
+    """One episode of T frames for P arms."""
+
+    number: int
+    status: NDArray[np.str_]  # (T, P)
+    error: Array  # (T, P) [rad] largest joint error of the round trip; NaN without the joint vectors
+    flagged: Flags  # (T, P) the decoder's status, a joint at its limit or a singularity says that it may not be exact
+    conditioning: Array  # (T, P)
+    position_error: Array  # (T, P) [m]
+    rotation_error: Array  # (T, P) [rad]
+
+
+@dataclass(frozen=True, eq=False)
+class Verification:
+    """What a dataset's round trip showed."""
+
+    layout: Layout
+    episodes: tuple[Checked, ...]
+    compared: bool  # whether the joint vectors were there to compare with
+    suspicions: dict[str, str]  # arm -> what is wrong with its joint values
+    other_side: dict[str, float]  # arm -> share of quaternions beyond the hemisphere of their reference
+
+    @property
+    def arms(self) -> tuple[str, ...]:
+        """Names of the arms."""
+        return tuple(part.label or part.space.arm.name for part in self.layout.parts)
+
+    def gathered(self, name: str, unflagged: bool = False) -> list[Array]:
+        """Values of all frames, an array an arm."""
+        return [
+            np.concatenate(
+                [
+                    getattr(each, name)[:, arm][~each.flagged[:, arm] if unflagged else slice(None)]
+                    for each in self.episodes
+                ]
+            )
+            for arm in range(len(self.arms))
+        ]
+
+    def invalid(self) -> dict[int, dict[str, int]]:
+        """Frames by status, of the episodes in which not all are ok."""
+        counts = {each.number: Counter(each.status.ravel().tolist()) for each in self.episodes}
+        return {
+            number: {status: count for status, count in counter.items() if status != Status.OK}
+            for number, counter in counts.items()
+            if set(counter) != {Status.OK}
+        }
+
+    def stretches(self) -> list[Stretch]:
+        """Where arms are near singularities."""
+        found = []
+        for each in self.episodes:
+            for arm, label in enumerate(self.arms):
+                found += [Stretch(each.number, label, *stretch) for stretch in stretches(each.conditioning[:, arm])]
+        return found
+
+    def report(self) -> dict[str, Any]:
+        """Everything as JSON."""
+        arms = {}
+        for arm, label in enumerate(self.arms):
+            error, clear = self.gathered("error")[arm], self.gathered("error", unflagged=True)[arm]
+            arms[label] = {
+                "space": self.layout.kind,
+                "joint_error": _percentiles(error) if self.compared else None,
+                "joint_error_unflagged": _percentiles(clear) if self.compared else None,
+                "position_error": _percentiles(self.gathered("position_error")[arm]),
+                "rotation_error": _percentiles(self.gathered("rotation_error")[arm]),
+                "flagged": int(sum(each.flagged[:, arm].sum() for each in self.episodes)),
+                "quaternions_other_side": self.other_side.get(label, 0.0),
+                "suspicion": self.suspicions.get(label, ""),
+            }
+        return {
+            "frames": sum(len(each.status) for each in self.episodes),
+            "episodes": len(self.episodes),
+            "arms": arms,
+            "invalid_by_episode": self.invalid(),
+            "near_singularity": [vars(stretch) for stretch in self.stretches()],
+        }
+
+
+def verify(dataset: Path, workers: int, on_progress: Callable[[int, int], object]) -> Verification:
+    """Decode a dataset's actions and compare them with the joint vectors that were encoded.
+
+    Seeds are the measured joints where the state has them, as on the robot, else the joint vector of
+    the step before.
+
+    Args:
+        dataset: Folder of a dataset that says what its actions mean.
+        workers: Number of worker processes.
+        on_progress: Called with the number of frames done, and their total.
+
+    Raises:
+        ErIlError: it does not say so, or is no dataset.
+    """
+    info = dataset_info(dataset)
+    layout = dataset_layout(info.features)
+    truth = joints_column(info.features, layout)
+    episodes = read_episodes(dataset, info, layout, truth)
+    suspicions = _suspicions(dataset, info.features, layout, episodes)
+    done = 0
+
+    def advance(frames: int) -> None:
+        nonlocal done
+        done += frames
+        on_progress(done, info.total_frames)
+
+    decoded = decode_episodes(layout, episodes, workers, advance)
+    checked = tuple(_check(layout, *each) for each in zip(episodes, decoded, strict=True))
+    return Verification(layout, checked, truth is not None, suspicions, _other_side(layout, episodes))
+
+
+def _check(layout: Layout, episode: Episode, decoded: DecodedEpisode) -> Checked:
+    error = np.full(decoded.status.shape, np.nan)
+    at_limit = np.empty(decoded.status.shape, dtype=bool)
+    for p, part in enumerate(layout.parts):
+        q, arm = layout.angles(part, decoded.vectors), part.space.arm
+        at_limit[:, p] = np.any((q - arm.lower < LIMIT_MARGIN) | (arm.upper - q < LIMIT_MARGIN), axis=1)
+        if episode.truth is not None:
+            error[:, p] = np.abs(q - layout.angles(part, episode.truth)).max(axis=1)
+    flagged = (decoded.status != Status.OK) | (decoded.conditioning < SINGULAR) | at_limit
+    return Checked(
+        episode.number,
+        decoded.status,
+        error,
+        flagged,
+        decoded.conditioning,
+        decoded.position_error,
+        decoded.rotation_error,
+    )
+
+
+def _other_side(layout: Layout, episodes: list[Episode]) -> dict[str, float]:
+    """Share of quaternions beyond their hemisphere, where another episode may have them with the other sign."""
+    found = {}
+    for part in layout.parts:
+        if isinstance(part.space, PoseSpace) and isinstance(part.space.rotation, Quaternion):
+            first = layout.encoded_names.index(part.names[len(POSITION_NAMES)])
+            quaternions = np.concatenate([each.actions[:, first : first + 4] for each in episodes])
+            found[part.label or part.space.arm.name] = float((quaternions @ part.space.rotation.reference < 0).mean())
+    return found
+
+
+def _suspicions(dataset: Path, features: dict[str, Feature], layout: Layout, episodes: list[Episode]) -> dict[str, str]:
+    """Look at the joint values of each arm, measured ones where an end effector was measured with them."""
+    recorded = None if episodes[0].truth is None else np.concatenate([np.asarray(each.truth) for each in episodes])
+    measured = None if episodes[0].state is None else np.concatenate([np.asarray(each.state) for each in episodes])
+    vectors = recorded if recorded is not None else measured
+    if vectors is None:
+        return {}
+    found = {}
+    for part in layout.parts:
+        positions = None if measured is None else _measured_positions(dataset, features, part.label)
+        values = (vectors if positions is None or measured is None else measured)[:, layout.indices(part)]
+        if text := suspect(Evidence(part.space.arm, part.motors, values, positions)):
+            found[part.label or part.space.arm.name] = text
+    return found
+
+
+def _measured_positions(dataset: Path, features: dict[str, Feature], label: str) -> Array | None:
+    names = dimension_names(features[STATE])
+    for prefix in (f"{label}_", f"{label}.") if label else ("",):
+        if all(prefix + name in names for name in POSITION_NAMES):
+            columns = [names.index(prefix + name) for name in POSITION_NAMES]
+            return read_vectors(dataset, STATE)[:, columns].astype(np.float64)
+    return None
+
+
+def _percentiles(values: Array) -> dict[str, float]:
+    if not len(values):
+        return {}
+    return {
+        f"p{share}": float(value) for share, value in zip(PERCENTILES, np.percentile(values, PERCENTILES), strict=True)
+    }

@@ -1,0 +1,145 @@
+"""The contract between a policy and a rollout: which action space, arm and frame it was trained for.
+
+Joint and task actions have the same length, so a length cannot tell a policy that fits from one
+that does not. A policy therefore declares its actions by a tag in its configuration
+(``policy.tags``, which LeRobot keeps in ``config.json``), as
+
+    er_il:<space>/<arm>/<end-effector frame>/<rotation>/<redundant joints>
+
+for instance ``er_il:erj/panda/panda_hand_tcp/quat/panda_joint1``; a dash stands for a part that
+the space does not have, a plus sign joins several joints.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from er_il.spaces import ActionSpace
+from er_il.spaces.spec import action_spec
+from er_il.support.errors import DatasetError, PolicyError
+
+PREFIX = "er_il:"
+NONE = "-"
+
+# Name of the post-processing step that `er-il attach` gives a policy, to decode for a robot by itself.
+DECODE_POLICY_ACTION = "er_il_decode_policy_action"
+
+
+@dataclass(frozen=True)
+class Contract:
+    """What a policy's actions mean."""
+
+    space: str
+    arm: str
+    frame: str
+    rotation: str = NONE
+    redundant: str = NONE  # joints that the action commands beside the pose, joined by +
+
+    @classmethod
+    def of_spec(cls, spec: Mapping[str, Any]) -> "Contract":
+        """Return the contract of an action space's specification."""
+        arm = spec["arm"]
+        # What a space commands beside the pose is the arm's redundant joints only if it names them.
+        commanded = [joint for joint in arm["redundant"] if f"{joint}.pos" in spec["names"]]
+        redundant = "+".join(commanded) if "rotation" in spec and commanded else NONE
+        return cls(spec["space"], arm["name"], arm["ee_frame"], spec.get("rotation", NONE), redundant)
+
+    @classmethod
+    def of_space(cls, space: ActionSpace) -> "Contract":
+        """Return the contract that an action space fulfils."""
+        return cls.of_spec(space.spec())
+
+    @classmethod
+    def of_tags(cls, tags: list[str] | None) -> "Contract | None":
+        """Read the contract among a policy's tags, if it is there and complete."""
+        for tag in tags or []:
+            parts = tag.removeprefix(PREFIX).split("/")
+            if tag.startswith(PREFIX) and len(parts) == len(fields(cls)):
+                return cls(*parts)
+        return None
+
+    @property
+    def tag(self) -> str:
+        """The contract as a policy's tag."""
+        return PREFIX + "/".join(getattr(self, part.name) for part in fields(self))
+
+
+def dataset_info(root: str | Path) -> dict[str, Any]:
+    """Read the ``meta/info.json`` of a LeRobot dataset.
+
+    Raises:
+        DatasetError: there is no dataset at ``root``.
+    """
+    path = Path(root) / "meta" / "info.json"
+    try:
+        return json.loads(path.read_text())
+    except (OSError, ValueError) as error:
+        raise DatasetError(f"No dataset at {root}: {path} is missing or unreadable.") from error
+
+
+def policy_contract(policy: str | Path) -> Contract:
+    """Find out what a policy's actions mean.
+
+    The dataset it was trained on knows best, where it is still at hand: a tag may have been
+    copied with a configuration from another arm or space.
+
+    Args:
+        policy: Folder of a pretrained policy, or its Hub id.
+
+    Raises:
+        PolicyError: the policy is missing or declares nothing.
+    """
+    declared = _of_dataset(Path(policy)) or Contract.of_tags(_tags(policy))
+    if declared is None:
+        raise PolicyError(
+            f"The policy {policy} does not say which action space it was trained for. Train it with a tag such as "
+            f"--policy.tags='[\"{Contract('erj', 'panda', 'panda_hand_tcp', 'quat', 'panda_joint1').tag}\"]', "
+            "or add the tag to its config.json."
+        )
+    return declared
+
+
+def check_policy(policy: str | Path, space: ActionSpace) -> None:
+    """Refuse a policy whose actions are not those of ``space``.
+
+    Raises:
+        PolicyError: it was trained for something else, and says what differs; or decodes by itself.
+    """
+    if decodes(policy):
+        raise PolicyError(
+            f"The policy {policy} decodes its actions by itself, for a robot (er-il attach). "
+            "Evaluate the policy that it was made from."
+        )
+    got, needed = policy_contract(policy), Contract.of_space(space)
+    different = [part.name for part in fields(Contract) if getattr(got, part.name) != getattr(needed, part.name)]
+    if different:
+        differences = ", ".join(f"{name} {getattr(got, name)!r} not {getattr(needed, name)!r}" for name in different)
+        raise PolicyError(f"The policy {policy} was trained for another action space: {differences}.")
+
+
+def decodes(policy: str | Path) -> bool:
+    """Whether a policy in a folder decodes its actions by itself (see :mod:`er_il.robots.attachment`)."""
+    try:
+        steps = json.loads((Path(policy) / "policy_postprocessor.json").read_text())["steps"]
+        return any(step.get("registry_name") == DECODE_POLICY_ACTION for step in steps)
+    except (OSError, ValueError, KeyError):
+        return False
+
+
+def _of_dataset(policy: Path) -> Contract | None:
+    try:
+        root = json.loads((policy / "train_config.json").read_text())["dataset"]["root"]
+        return Contract.of_spec(action_spec(dataset_info(root)["features"])) if root else None
+    except (OSError, ValueError, KeyError, TypeError, DatasetError):
+        return None  # trained elsewhere, or the dataset has moved: the tag has to do
+
+
+def _tags(policy: str | Path) -> list[str] | None:
+    from lerobot.configs import PreTrainedConfig
+
+    try:
+        return PreTrainedConfig.from_pretrained(policy).tags
+    except (OSError, ValueError) as error:  # huggingface_hub's errors derive from these
+        raise PolicyError(f"No policy at {policy}: {str(error).splitlines()[0]}") from error

@@ -1,0 +1,63 @@
+"""The decoders that reports compare: an action space, and what IK does with the freedom it leaves.
+
+Both decoders of task space read the same dataset and the same policy.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from er_il.arms.arm import Arm
+from er_il.spaces import AT, SPACES, ActionSpace, check_space, make_action_space
+from er_il.support.errors import ShapeError, UnknownNameError
+
+NEAREST, POSTURE = "nearest", "posture"
+RESOLUTIONS = (NEAREST, POSTURE)
+
+
+@dataclass(frozen=True)
+class Decoder:
+    """An action space by kind, and how IK resolves what the action leaves open.
+
+    ``nearest`` takes the solution near the measured joints, ``posture`` the one near a posture: the
+    arm's comfortable one, or the one given here. Only task space leaves anything open.
+    """
+
+    space: str
+    resolution: str = NEAREST
+    posture: tuple[float, ...] = ()  # (n,) [rad]; the arm's comfortable one if empty
+
+    def __post_init__(self) -> None:
+        check_space(self.space)
+        if self.resolution not in RESOLUTIONS:
+            raise UnknownNameError("resolution", self.resolution, RESOLUTIONS)
+
+    def action_space(self, arm: Arm, rotation: str = "quat") -> ActionSpace:
+        """Build the action space that decodes for an arm."""
+        chosen = np.array(self.posture) if self.posture else arm.home
+        if chosen.shape != (arm.dof,):
+            raise ShapeError("The posture", chosen.shape, f"({arm.dof},)")
+        posture = chosen if self.resolution == POSTURE else None
+        return make_action_space(self.space, arm, rotation=rotation, posture=posture)
+
+
+def _decoders() -> dict[str, Decoder]:
+    table = {space: Decoder(space) for space in SPACES if space != "task"}
+    table |= {f"task-{resolution}": Decoder("task", resolution) for resolution in RESOLUTIONS}
+    return table
+
+
+DECODERS = _decoders()  # by the name that reports use
+
+
+def decoder(name: str) -> Decoder:
+    """Return a decoder by its report name, or that of an action space with its joints: ``erj@panda_joint3``.
+
+    Raises:
+        UnknownNameError: no decoder has that name.
+    """
+    if AT in name:
+        return Decoder(name)
+    if name not in DECODERS:
+        raise UnknownNameError("decoder", name, DECODERS)
+    return DECODERS[name]

@@ -1,0 +1,52 @@
+"""Names of the simulated tasks: ``reach_cup`` on the command line, ``sim_tasks/ReachCup-v0`` in Gymnasium.
+
+Tasks come from packages that name a module under the entry points ``er_il.tasks``; importing the module
+registers them with Gymnasium, in a namespace of the entry point's name.
+"""
+
+import re
+from functools import cache
+from importlib.metadata import entry_points
+
+import gymnasium
+
+from er_il.support.errors import UnknownNameError
+
+GROUP = "er_il.tasks"
+
+
+def task_names() -> tuple[str, ...]:
+    """Names of the registered tasks, in alphabetical order."""
+    return tuple(sorted(_ids()))
+
+
+def task_id(name: str) -> str:
+    """Gymnasium id of a task.
+
+    Raises:
+        UnknownNameError: no task has that name.
+    """
+    ids = _ids()
+    if name not in ids:
+        raise UnknownNameError("task", name, sorted(ids))
+    return ids[name]
+
+
+@cache
+def _namespaces() -> frozenset[str]:
+    """Namespaces of the packages that provide tasks; their tasks are registered."""
+    providers = entry_points(group=GROUP)
+    for provider in providers:
+        provider.load()
+    return frozenset(provider.name for provider in providers)
+
+
+def _ids() -> dict[str, str]:
+    """Task name -> id of its newest version."""
+    namespaces = _namespaces()
+    specs = [spec for spec in gymnasium.registry.values() if spec.namespace in namespaces]
+    return {_snake_case(spec.name): spec.id for spec in sorted(specs, key=lambda spec: spec.version or 0)}
+
+
+def _snake_case(name: str) -> str:
+    return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()

@@ -1,0 +1,1 @@
+"""Rollouts and replays, and what they amount to."""

@@ -1,0 +1,84 @@
+"""One rollout of a trained policy, recorded in full: a trace, and a film if wanted."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from lerobot.envs.utils import NEW_ROLLOUT_OPTION
+from numpy.typing import NDArray
+
+from er_il.evaluation.rollouts import TIMEOUT
+from er_il.evaluation.trace import Trace
+from er_il.policy.actor import Actor, environment_of
+
+SUCCESS = "success"
+Picture = NDArray[np.uint8]  # (H, W, 3)
+
+
+def record_rollout(
+    policy: Path, task: str, decoder_name: str, seed: int, film_every: int = 0
+) -> tuple[Trace, list[Picture]]:
+    """Roll a policy out once, exactly as :func:`er_il.evaluation.rollouts.evaluate` does on that seed.
+
+    Args:
+        policy: Folder of the pretrained policy.
+        task: Name of the task.
+        decoder_name: ``joint``, ``task-nearest``, ``task-posture``, ``erj``, ``era``.
+        seed: Seed of the initial state.
+        film_every: Take a picture each so many control steps, and one at the end; 0: none.
+    """
+    config = environment_of(policy, task, decoder_name)
+    actor = Actor.load(policy, config)
+    env = config.make()
+    world: Any = env.unwrapped
+    pictures: list[Picture] = []
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    rows: dict[str, list[Any]] = {key: [] for key in ("q", "gripper", "action", "command", "status", "state")}
+    try:
+        observation, info = env.reset(seed=seed, options={NEW_ROLLOUT_OPTION: True})
+        actor.reset(seed)
+        done = False
+        while not done:
+            if film_every and len(rows["q"]) % film_every == 0:
+                pictures.append(world.render())
+            batch = _batched(observation)
+            rows["q"].append(world.joint_positions)
+            rows["gripper"].append(world.gripper_opening)
+            rows["state"].append(observation["environment_state"])
+            action = actor.act(batch, world.task_description)[0]
+            observation, _, terminated, truncated, info = env.step(action)
+            rows["action"].append(action)
+            rows["command"].append(info["command"])
+            rows["status"].append(info["decode_status"])
+            done = terminated or truncated
+        if film_every:
+            pictures.append(world.render())
+        trace = Trace(
+            task=task,
+            seed=seed,
+            period=1 / env.metadata["render_fps"],
+            label=decoder_name,
+            outcome=SUCCESS if info["is_success"] else info["failure"] or TIMEOUT,
+            spec=env.space.spec(),
+            q=np.array(rows["q"]),
+            gripper=np.array(rows["gripper"]),
+            action=np.array(rows["action"], dtype=np.float64),
+            command=np.array(rows["command"]),
+            status=tuple(rows["status"]),
+            environment_state=np.array(rows["state"], dtype=np.float64),
+            environment_state_names=world.environment_state_names,
+        )
+        return trace, pictures
+    finally:
+        env.close()
+        torch.set_num_threads(threads)
+
+
+def _batched(observation: dict[str, Any]) -> dict[str, Any]:
+    """Add the leading dimension that a vector environment gives to every entry."""
+    return {
+        key: _batched(value) if isinstance(value, dict) else np.asarray(value)[None]
+        for key, value in observation.items()
+    }

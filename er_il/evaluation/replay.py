@@ -1,0 +1,189 @@
+"""Replay: what recorded actions do when a follower executes them again, the ceiling of each encoding.
+
+A policy that imitated its demonstrations perfectly would do what a replay does. Where a replay
+fails, the encoding has lost something that the task needs.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from er_il.arms.arm import Arm
+from er_il.datasets.recipe import Recipe
+from er_il.datasets.record import Record, Recorded, read_episodes, read_spec
+from er_il.envs.decoders import DECODERS, decoder
+from er_il.envs.tasks import task_id
+from er_il.envs.wrapper import DecodingEnv, make_decoding_env
+from er_il.evaluation.outcomes import summarise
+from er_il.kinematics.rotation import Quaternion
+from er_il.spaces import from_spec, name_of
+from er_il.support.atomic_files import write_json
+from er_il.support.errors import DatasetError
+from er_il.support.workers import worker_pool
+
+# [s] The last action is held that long at most: a grip found a little later than in the demo is a grip all the same.
+GRACE = 1.0
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """One demo, executed again."""
+
+    seed: int
+    success: bool
+    failure: str  # "" after success
+    deviation: float  # [rad] largest distance of a joint from where it was in the demo at that step, pushed or not
+    joint_step: float  # [rad] largest joint change that a decoded action asked for
+    statuses: Counter[str]  # of decoding, one a step
+
+
+@dataclass(frozen=True)
+class ReplayCell:
+    """All demos of one dataset, executed through one decoder."""
+
+    task: str
+    decoder: str
+    demos: tuple[Replayed, ...]
+    dropped: Counter[str]  # why the leader's other starts gave no demo
+
+    @property
+    def successes(self) -> int:
+        """Number of demos that succeeded again."""
+        return sum(demo.success for demo in self.demos)
+
+    def report(self) -> dict[str, Any]:
+        """Return the cell as JSON."""
+        return summarise(self.task, self.decoder, self.demos) | {
+            "leader": {"starts": len(self.demos) + self.dropped.total(), "dropped": dict(self.dropped.most_common())},
+            "max_joint_deviation": max(demo.deviation for demo in self.demos),
+            "demos": [
+                {"seed": demo.seed, "success": demo.success, "failure": demo.failure, "max_deviation": demo.deviation}
+                for demo in self.demos
+            ],
+        }
+
+
+def replay(datasets: Sequence[Path], workers: int, advance: Callable[[Path, str, int, int], None]) -> list[ReplayCell]:
+    """Execute every demo of every dataset through each decoder that reads the dataset's space.
+
+    Args:
+        datasets: Folders of datasets.
+        workers: Number of worker processes.
+        advance: Called after each demo with the dataset, the decoder's name, the demos done, and their number.
+
+    Raises:
+        DatasetError: a folder is no dataset of ``er-il generate``.
+        SpecError: a dataset's actions mean something else in this version of er_il.
+    """
+    plays = [(dataset, play, read_episodes(dataset)) for dataset in datasets for play in _plays(dataset)]
+    cells = []
+    with worker_pool(workers, _prepare) as pool:
+        running = [(path, play, [pool.submit(_replay, play, demo) for demo in demos]) for path, play, demos in plays]
+        for path, play, jobs in running:
+            done = []
+            for job in jobs:
+                done.append(job.result())
+                advance(path, play.decoder, len(done), len(jobs))
+            dropped = Counter(Record.read(path).dropped.values())
+            cells.append(ReplayCell(play.recipe.task, play.decoder, tuple(done), dropped))
+    return cells
+
+
+def replay_demo(world: DecodingEnv, demo: Recorded) -> Replayed:
+    """Execute a demo's actions in the world it was recorded in."""
+    world.reset(seed=demo.seed)
+    unwrapped: Any = world.unwrapped
+    grace = round(GRACE * world.metadata["render_fps"])
+    actions = np.concatenate([demo.actions, np.repeat(demo.actions[-1:], grace, axis=0)])
+    joints = demo.state[:, : world.space.arm.dof]
+    deviation = joint_step = 0.0
+    statuses: Counter[str] = Counter()
+    info: dict[str, Any] = {}
+    for step, action in enumerate(actions):
+        if step < len(joints):
+            deviation = max(deviation, float(np.max(np.abs(unwrapped.joint_positions - joints[step]))))
+        _, _, terminated, truncated, info = world.step(action)
+        statuses[info["decode_status"]] += 1
+        joint_step = max(joint_step, info["joint_step"])
+        if terminated or truncated:
+            break
+    success = bool(info["is_success"])
+    failure = "" if success else info["failure"] or "unfinished"
+    return Replayed(demo.seed, success, failure, deviation, joint_step, statuses)
+
+
+def find_datasets(names: Sequence[str]) -> list[Path]:
+    """Resolve what a user names: a dataset, a folder of datasets, or a task (its folder in ``datasets``).
+
+    Raises:
+        DatasetError: nothing is there.
+    """
+    found = []
+    for name in names:
+        folder = next((path for path in (Path(name), Path("datasets") / name) if path.is_dir()), None)
+        inside = [] if folder is None else sorted(path.parent.parent for path in folder.glob("*/meta/info.json"))
+        if folder is not None and (folder / "meta/info.json").is_file():
+            found.append(folder)
+        elif inside:
+            found += inside
+        else:
+            raise DatasetError(f"No dataset at {name}. Generate one first: er-il generate TASK.")
+    return found
+
+
+def write_report(cells: Sequence[ReplayCell], meta: dict[str, Any], path: Path) -> None:
+    """Write the cells as JSON, in the form of every report."""
+    write_json(path, {"meta": meta, "cells": [cell.report() for cell in cells]})
+
+
+@dataclass(frozen=True)
+class _Play:
+    """Which world, and which decoder."""
+
+    recipe: Recipe
+    decoder: str
+    rotation: str
+
+    def make(self) -> DecodingEnv:
+        environment = replace(self.recipe, cameras=()).environment
+        return make_decoding_env(
+            task_id(self.recipe.task), decoder(self.decoder), rotation=self.rotation, **environment
+        )
+
+
+def _plays(dataset: Path) -> list[_Play]:
+    spec, recipe = read_spec(dataset), Record.read(dataset).recipe
+    name = name_of(from_spec(spec), Arm.preset(recipe.arm))  # refuses what this version would decode differently
+    rotation = spec.get("rotation", Quaternion.kind)
+    readers = [key for key, each in DECODERS.items() if each.space == name] or [name]
+    return [_Play(recipe, reader, rotation) for reader in readers]
+
+
+@dataclass
+class _Worker:
+    """The world a worker process has open: demos of one play come one after the other."""
+
+    play: _Play | None = None
+    world: DecodingEnv | None = None
+
+    def replay(self, play: _Play, demo: Recorded) -> Replayed:
+        if self.world is None or play != self.play:
+            self.play, self.world = play, play.make()
+        return replay_demo(self.world, demo)
+
+
+_worker: _Worker | None = None
+
+
+def _prepare() -> None:
+    global _worker
+    _worker = _Worker()
+
+
+def _replay(play: _Play, demo: Recorded) -> Replayed:
+    assert _worker is not None
+    return _worker.replay(play, demo)

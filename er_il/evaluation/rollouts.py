@@ -1,0 +1,165 @@
+"""Rollouts of a trained policy through a decoder, batched, and what they amount to."""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from gymnasium.vector import SyncVectorEnv
+from lerobot.envs.utils import NEW_ROLLOUT_OPTION
+
+from er_il.control.commander import BEST_EFFORT
+from er_il.evaluation.elbow import ElbowReference
+from er_il.evaluation.outcomes import summarise
+from er_il.kinematics.solver import Status
+from er_il.policy.actor import POLICY_ROWS, Actor, environment_of
+from er_il.support.errors import ErIlError
+
+FIRST_SEED = 1000  # LeRobot's own; demonstrations use seeds from a million up
+TIMEOUT = "timeout"
+
+
+@dataclass(frozen=True)
+class Episode:
+    """One rollout."""
+
+    seed: int
+    success: bool
+    failure: str  # "" after success
+    statuses: Counter[str]  # of decoding, one a step
+    latencies: tuple[float, ...]  # [s] of decoding, one a step
+    joint_step: float  # [rad] largest joint change that a decoded action asked for
+    elbow_error: float | None = None  # [m] see :class:`er_il.evaluation.elbow.ElbowReference`; None: not measured
+
+    @property
+    def steps(self) -> int:
+        """Number of control steps."""
+        return len(self.latencies)
+
+    @property
+    def invalid(self) -> int:
+        """Number of actions whose status was not OK."""
+        return self.steps - self.statuses[Status.OK]
+
+
+@dataclass(frozen=True)
+class Cell:
+    """All episodes of one task and decoder."""
+
+    task: str
+    decoder: str
+    episodes: tuple[Episode, ...]
+
+    @classmethod
+    def joined(cls, parts: Sequence["Cell"]) -> "Cell":
+        """Return all episodes of parts of the same cell."""
+        return cls(parts[0].task, parts[0].decoder, tuple(episode for part in parts for episode in part.episodes))
+
+    @property
+    def successes(self) -> int:
+        """Number of successful episodes."""
+        return sum(episode.success for episode in self.episodes)
+
+    def report(self) -> dict[str, Any]:
+        """Return the cell as JSON."""
+        latencies = np.concatenate([episode.latencies for episode in self.episodes])
+        elbow_errors = [episode.elbow_error for episode in self.episodes if episode.elbow_error is not None]
+        measured = {"elbow_error": float(np.mean(elbow_errors))} if elbow_errors else {}
+        return summarise(self.task, self.decoder, self.episodes) | {
+            "decode_p50_ms": 1e3 * float(np.percentile(latencies, 50)),
+            "decode_p99_ms": 1e3 * float(np.percentile(latencies, 99)),
+            "mean_steps": len(latencies) / len(self.episodes),
+            **measured,
+        }
+
+
+def evaluate(
+    policy: Path,
+    task: str,
+    decoder_name: str,
+    *,
+    episodes: int = 50,
+    seed: int = FIRST_SEED,
+    on_invalid: str = BEST_EFFORT,
+    posture: Sequence[float] = (),
+    elbow: ElbowReference | None = None,
+    batch_size: int = POLICY_ROWS,
+    advance: Callable[[int], None] = lambda episodes: None,
+) -> Cell:
+    """Roll a policy out on the seeds ``seed, seed + 1, ...``.
+
+    Args:
+        policy: Folder of the pretrained policy.
+        task: Name of the task.
+        decoder_name: ``joint``, ``task-nearest``, ``task-posture``, ``erj``.
+        episodes: Number of rollouts.
+        seed: Seed of the first one; the same seed is the same initial state for every decoder.
+        on_invalid: See :class:`er_il.control.commander.Commander`.
+        posture: (n,) [rad] to which ``task-posture`` pulls; the arm's comfortable one if empty.
+        elbow: What to measure the elbow against, if anything.
+        batch_size: Environments side by side, up to ``POLICY_ROWS``; it changes no result, unless the policy
+            draws random numbers, as Diffusion does.
+        advance: Called with the number of episodes just finished.
+
+    Raises:
+        PolicyError: the policy is missing, or was trained for another action space or other cameras.
+        UnknownNameError: no such task or decoder.
+        ErIlError: no episodes.
+    """
+    if episodes < 1:
+        raise ErIlError(f"{episodes} episodes say nothing; ask for at least one.")
+    if not 1 <= batch_size <= POLICY_ROWS:
+        raise ErIlError(f"The batch size is {batch_size}; it must be between 1 and {POLICY_ROWS}.")
+    config = environment_of(policy, task, decoder_name, on_invalid, posture)
+    actor = Actor.load(policy, config)
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)  # rounding depends on the number of threads, too
+    vector = config.create_envs(min(batch_size, episodes))[config.type][0]
+    assert isinstance(vector, SyncVectorEnv)
+    try:
+        done: list[Episode] = []
+        while len(done) < episodes:
+            seeds = list(range(seed + len(done), seed + min(len(done) + vector.num_envs, episodes)))
+            done += _rollout(vector, actor, seeds, elbow)
+            advance(len(seeds))
+    finally:
+        vector.close()
+        torch.set_num_threads(threads)
+    return Cell(task, decoder_name, tuple(done))
+
+
+def _rollout(vector: SyncVectorEnv, actor: Actor, seeds: list[int], elbow: ElbowReference | None) -> list[Episode]:
+    """Run one episode a seed, side by side, until the last has ended."""
+    n = vector.num_envs
+    # An environment without a seed of its own repeats the last: its outcome is dropped.
+    all_seeds: list[int | None] = [*seeds, *seeds[-1:] * (n - len(seeds))]
+    observation, _ = vector.reset(seed=all_seeds, options={NEW_ROLLOUT_OPTION: True})
+    actor.reset(seeds[0])
+    description = vector.get_attr("task_description")[0]
+    done = np.zeros(n, dtype=bool)
+    success, failure = np.zeros(n, dtype=bool), [""] * n
+    paths: list[list[np.ndarray]] = [[] for _ in seeds]  # of the joints, with the hand's pose behind them
+    while not done.all():
+        for i in np.flatnonzero(~done[: len(seeds)]):
+            paths[i].append(observation["agent_pos"][i].copy())
+        observation, _, terminated, truncated, info = vector.step(actor.act(observation, description)[:n])
+        for i in np.flatnonzero(~done):
+            success[i] = info["is_success"][i]
+            failure[i] = "" if success[i] else info["failure"][i] or TIMEOUT
+        done |= terminated | truncated
+    tallies = [commander.tally for commander in vector.get_attr("commander")]
+    return [
+        Episode(
+            seed=seed,
+            success=bool(success[i]),
+            failure=failure[i],
+            statuses=Counter(map(str, tallies[i].statuses.elements())),
+            latencies=tuple(tallies[i].latencies),
+            joint_step=tallies[i].largest_step,
+            elbow_error=elbow.error(np.array(paths[i], dtype=np.float64)[:, : elbow.arm.dof]) if elbow else None,
+        )
+        for i, seed in enumerate(seeds)
+    ]

@@ -1,0 +1,1 @@
+"""Grids of trainings and rollouts, and studies of the action spaces."""

@@ -1,0 +1,1 @@
+"""Studies of the action spaces by kinematics."""

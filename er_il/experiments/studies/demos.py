@@ -1,0 +1,63 @@
+"""The demonstrations that a study looks at: datasets as they are, or a task's, recorded for it."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.progress import Progress
+
+from er_il.arms.arm import Arm
+from er_il.datasets.joint_path import ArmPaths, JointPath
+from er_il.datasets.joint_paths import read_joint_paths
+from er_il.datasets.recipe import Recipe, recipe_names
+from er_il.datasets.recording import generate
+from er_il.spaces import JointSpace
+from er_il.support.errors import DatasetError, UnknownNameError
+
+
+def study_demos(
+    names: Sequence[str], episodes: int, folder: Path, progress: Progress, workers: int
+) -> tuple[Arm, dict[str, tuple[JointPath, ...]]]:
+    """Read datasets of one arm, or record them.
+
+    Args:
+        names: Folders of datasets, or tasks.
+        episodes: Demonstrations to record of a task; of a dataset, so many are looked at, spread evenly.
+        folder: Where tasks are recorded, one folder each. What is there already is used again.
+        progress: Where to show progress.
+        workers: Number of worker processes.
+
+    Returns:
+        The arm, and its demonstrations by name of the task or dataset.
+
+    Raises:
+        UnknownNameError: a name is neither a folder nor a task.
+        DatasetError: the datasets are of several arms, or there is none.
+    """
+    found: dict[str, ArmPaths] = {}
+    for name in names:
+        dataset = Path(name)
+        if not dataset.is_dir():
+            if name not in recipe_names():
+                raise UnknownNameError("dataset or task", name, ["the folder of a dataset", *recipe_names()])
+            made = generate(Recipe.load(name).resized(episodes), [JointSpace.kind], folder / name, progress, workers)
+            dataset = made.paths[JointSpace.kind]
+        first, *others = read_joint_paths(dataset, workers=workers)
+        if others:
+            raise DatasetError(f"{name} is of several arms; a study is of one. er-il advise looks at each.")
+        found[_unique(dataset.parent.name if dataset.name == JointSpace.kind else dataset.name, found)] = first
+    arms = [paths.arm for paths in found.values()]
+    if not arms:
+        raise DatasetError("Name a dataset or a task, such as reach_cup.")
+    if {arm.fingerprint for arm in arms} != {arms[0].fingerprint}:
+        raise DatasetError(f"The datasets are of several arms: {', '.join(arm.name for arm in arms)}.")
+    return arms[0], {name: spread(each.paths, episodes) for name, each in found.items()}
+
+
+def spread(paths: Sequence[JointPath], count: int) -> tuple[JointPath, ...]:
+    """At most ``count`` of the episodes, spread evenly from the first to the last."""
+    chosen = sorted({round(i * (len(paths) - 1) / max(1, count - 1)) for i in range(count)})
+    return tuple(paths[i] for i in chosen)
+
+
+def _unique(name: str, taken: dict[str, ArmPaths]) -> str:
+    return name if name not in taken else f"{name}-{len(taken) + 1}"

@@ -1,0 +1,206 @@
+"""Local search for joint angles that meet a goal: damped steps from a seed, and what to try around it.
+
+The steps are Levenberg-Marquardt's: damping that grows with the squared miss (Sugihara 2011) keeps
+them short near a singularity, where undamped ones leap to another branch of solutions, and vanishes
+as the goal is met, so that the last steps are quadratic. Undamped, they are Gauss and Newton's, each
+taken as it comes: what a solver does that follows the Jacobian's pseudo-inverse.
+
+Where a goal determines the joints (ERJ, ERA), solutions come in pairs that meet at a singularity,
+the fold. Near it the seed may lie closer to the one of the pair that the steps did not find.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+import placo  # pyright: ignore[reportMissingImports]
+from numpy.typing import NDArray
+
+from er_il.arms.arm import POSE_DOF, Vector
+from er_il.kinematics.arm_angle import ArmAngle, wrapped
+from er_il.kinematics.forward import ForwardKinematics
+from er_il.kinematics.qp import PoseQp
+
+POSITION_TOLERANCE = 1e-4  # [m]
+ROTATION_TOLERANCE = 1e-3  # [rad]
+MAX_ITERATIONS = 50
+DAMPING_GROWTH = 1e-2  # [1] damping per squared miss in m and rad
+CAUTION = 10.0  # damping grows by this factor after a step that overshot, and shrinks after one that did not
+POLISH = 1e-8  # [m and rad] solve this far: the last steps are quadratic, and near a fold joints need it
+SLOW = 0.95  # a step that leaves more of the miss than this is slow,
+PATIENCE = 6  # and so many in a row, the goal still missed, mean that it is out of reach
+LIMIT_MARGIN = 1e-4  # [rad] a joint this close to its limit is at it
+STALL = 1e-10  # [rad] a step this small changes nothing: stop early
+FOLD = 3e-2  # smallest singular value (m and rad mixed) below which another solution may lie close by
+FOLD_REACH = 0.5  # [rad] how far away that other solution is looked for
+FOLD_MARGIN = 0.05  # [rad] by how much its first guess may look farther from the seed
+NEAR = 0.3  # [m and rad] a goal this close to the seed deserves further attempts
+ASIDE = (0.1, -0.1, 0.2, -0.2)  # [rad] how far beside the seed they start
+FEW_ITERATIONS = 12
+FOLD_STEP = 1e-4  # [rad] of the finite difference across the fold
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What a solution must meet."""
+
+    T_base_ee: NDArray[np.float64]  # (4, 4)
+    arm_angle: float | None  # [rad]
+    fixed: frozenset[str]  # joints that stay where the start has them
+
+
+class Miss(NamedTuple):
+    """How far joint angles are from a goal."""
+
+    position: float  # [m]
+    rotation: float  # [rad]
+    size: float  # norm of what the QP corrects, the arm angle as a length along the elbow's circle
+    angle: float = 0.0  # [rad] of the arm angle
+    angle_row: tuple[Vector, float] | None = None  # slope (n,) [m/rad] along the circle, and the length to go [m]
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """Where a run of iterations ended."""
+
+    q: Vector  # (n,) [rad]
+    miss: Miss
+    moving: bool  # whether it was still getting closer
+
+    @property
+    def reached(self) -> bool:
+        return (
+            self.miss.position <= POSITION_TOLERANCE and max(self.miss.rotation, self.miss.angle) <= ROTATION_TOLERANCE
+        )
+
+
+class LocalSearch:
+    """The search for one arm. Not thread-safe."""
+
+    def __init__(self, kinematics: ForwardKinematics, damped: bool) -> None:
+        self.arm = kinematics.arm
+        self._kinematics = kinematics
+        self._damped = damped
+        self.iterations = 0  # of all runs so far
+        self._robot = placo.RobotWrapper("", placo.Flags.ignore_collisions, self.arm.model_xml)
+        self._programs: dict[tuple[frozenset[str], bool, bool], PoseQp] = {}
+
+    @cached_property
+    def arm_angle(self) -> ArmAngle:
+        """The arm angle as a function of the joints.
+
+        Raises:
+            ArmError: the arm names no shoulder, elbow and wrist.
+        """
+        return ArmAngle(self._kinematics)
+
+    def run(self, goal: Goal, q: Vector, posture: Vector | None = None, limit: int = MAX_ITERATIONS) -> Attempt:
+        """Run QP steps from q until the goal is met well within tolerance, or nothing moves any more."""
+        program = self._program(goal, posture is not None)
+        program.aim(goal.T_base_ee, posture)
+        moving, iters, caution, slow = True, 0, 1.0, 0
+        miss = self._miss(goal, q)
+        while moving and iters < limit and (posture is not None or miss.size > POLISH):
+            try:
+                damping = caution * DAMPING_GROWTH * miss.size**2 if self._damped else 0.0
+                moved = program.step(q, damping, miss.angle_row)
+            except RuntimeError:  # the QP has no solution: keep the last angles, the caller sees the miss
+                moving = False
+                break
+            iters += 1
+            self.iterations += 1
+            missed = self._miss(goal, moved)
+            slow = slow + 1 if missed.size > max(SLOW * miss.size, POSITION_TOLERANCE) else 0
+            moving = bool(np.abs(moved - q).max() >= STALL) and (posture is not None or slow < PATIENCE)
+            if self._damped and posture is None and missed.size > miss.size:
+                caution *= CAUTION  # overshot: try a shorter step from the same place
+            else:
+                q, miss, caution = moved, missed, max(1.0, caution / CAUTION)
+        return Attempt(q, miss, moving)
+
+    def _miss(self, goal: Goal, q: Vector) -> Miss:
+        pos_err, rot_err = self._kinematics.pose_error(goal.T_base_ee, q)
+        if goal.arm_angle is None:
+            return Miss(pos_err, rot_err, math.hypot(pos_err, rot_err))
+        angle, radius, slope = self.arm_angle.slope(q)
+        turn = wrapped(goal.arm_angle - angle)
+        return Miss(pos_err, rot_err, math.hypot(pos_err, rot_err, radius * turn), abs(turn), (slope, radius * turn))
+
+    def beside(self, goal: Goal, seed: Vector, found: Attempt) -> Attempt | None:
+        """A better solution than ``found``, from beside the seed, if there is one.
+
+        Starts lie along the direction in which the goal is least sensitive: where a goal close to
+        the seed was missed, or met only far away, a fold or the elbow's axis lay in between.
+        """
+        if not self._determined(goal) or self._miss(goal, seed).size > NEAR:
+            return None
+        v = self._embedded(goal, np.linalg.svd(self.derivative(goal, seed))[2][-1])
+        starts = (np.clip(seed + share * v, self.arm.lower, self.arm.upper) for share in ASIDE)
+        attempts = [found, *(self.run(goal, start, limit=FEW_ITERATIONS) for start in starts)]
+        reached = [attempt for attempt in attempts if attempt.reached]
+        return min(reached, key=lambda attempt: float(np.linalg.norm(attempt.q - seed)), default=None)
+
+    def across_fold(self, goal: Goal, found: Attempt, seed: Vector) -> Attempt | None:
+        """The solution on the other side of a fold close by, if it exists and is nearer the seed.
+
+        Along the direction v that the map loses at the fold, its slope s(t) = s + t s' vanishes at
+        t = -s/s', so the pose of t = 0 returns at t = -2 s/s'. From there the iterations take over.
+        """
+        if not self._determined(goal):
+            return None
+        left, slopes, right = np.linalg.svd(self.derivative(goal, found.q))
+        slope = float(slopes[-1])
+        if slope > FOLD:
+            return None
+        v = self._embedded(goal, right[-1])
+        ahead = float(left[:, -1] @ self.derivative(goal, found.q + FOLD_STEP * v) @ right[-1])
+        change = (ahead - slope) / FOLD_STEP
+        if abs(change) * FOLD_REACH <= 2.0 * slope:
+            return None
+        guess = np.clip(found.q - (2.0 * slope / change) * v, self.arm.lower, self.arm.upper)
+        distance = np.linalg.norm(found.q - seed) if found.reached else np.inf
+        if np.linalg.norm(guess - seed) > distance + FOLD_MARGIN:
+            return None
+        twin = self.run(goal, guess)
+        return twin if twin.reached and np.linalg.norm(twin.q - seed) < distance else None
+
+    def held_by_limit(self, goal: Goal, attempt: Attempt) -> bool:
+        """Whether a joint would have to pass its limit to come closer to the goal."""
+        q, arm = attempt.q, self.arm
+        push = self._kinematics.jacobian(q).T @ self._kinematics.pose_gap(goal.T_base_ee, q)
+        if attempt.miss.angle_row is not None:
+            gradient, change = attempt.miss.angle_row
+            push = push + gradient * change
+        at_lower, at_upper = q - arm.lower < LIMIT_MARGIN, arm.upper - q < LIMIT_MARGIN
+        return bool(np.any(((at_lower & (push < 0)) | (at_upper & (push > 0))) & self.free(goal)))
+
+    def free(self, goal: Goal) -> NDArray[np.bool_]:
+        """Which joints (n,) the goal lets move."""
+        return np.array([joint not in goal.fixed for joint in self.arm.joints])
+
+    def _determined(self, goal: Goal) -> bool:
+        """Whether the goal has isolated solutions: as many conditions as free joints."""
+        return int(self.free(goal).sum()) == POSE_DOF + (goal.arm_angle is not None)
+
+    def derivative(self, goal: Goal, q: Vector) -> NDArray[np.float64]:
+        """Derivative of what the goal conditions by the free joints, square where it is determined."""
+        jacobian = self._kinematics.jacobian(q)
+        if goal.arm_angle is not None:
+            jacobian = np.vstack([jacobian, self.arm_angle.slope(q)[2]])
+        return jacobian[:, self.free(goal)]
+
+    def _embedded(self, goal: Goal, free: Vector) -> Vector:
+        """A change of the free joints as one of all joints (n,)."""
+        v = np.zeros(self.arm.dof)
+        v[self.free(goal)] = free
+        return v
+
+    def _program(self, goal: Goal, posture: bool) -> PoseQp:
+        key = (goal.fixed, posture, goal.arm_angle is not None)
+        if key not in self._programs:
+            self._programs[key] = PoseQp(
+                self._robot, self.arm, goal.fixed, posture=posture, arm_angle=goal.arm_angle is not None
+            )
+        return self._programs[key]

@@ -1,1 +1,0 @@
-"""The main job in one call, and what a reader sees of results."""

@@ -1,0 +1,206 @@
+"""Layout: which dimensions of a robot's joint vector move which arm, and what the encoded vector looks like.
+
+One vector may hold several arms, their joints in any order, and anything else (grippers, a lift, a
+base). Encoded, it holds each arm's commands, one arm after the other, then everything else as it was.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from er_il.arms.portable import arm_from_spec, arm_spec
+from er_il.spaces import ActionSpace, Decoded, JointSpace, from_spec, make_action_space
+from er_il.spaces.motors import Motors
+from er_il.spaces.references import fitted
+from er_il.spaces.spec import SPEC_VERSION
+from er_il.support.errors import DatasetError, ShapeError, SpecError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One arm of a robot."""
+
+    label: str  # "" where there is but one
+    space: ActionSpace
+    motors: Motors
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the dimensions of the encoded vector that command the arm."""
+        return tuple(f"{self.label}_{name}" if self.label else name for name in self.space.arm_names)
+
+
+@dataclass(frozen=True)
+class LayoutDecoded:
+    """A joint vector, and what became of each arm's command."""
+
+    vector: Array  # (D,) the robot's values
+    parts: tuple[Decoded, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """The arms in a joint vector of D named dimensions.
+
+    In joint space the encoded vector is the joint vector itself: the robot's names, order and units.
+
+    Raises:
+        DatasetError: arms share a dimension or a label, or use one that is not there.
+    """
+
+    names: tuple[str, ...]  # of the joint vector
+    parts: tuple[Part, ...]
+
+    def __post_init__(self) -> None:
+        used = [joint for part in self.parts for joint in part.motors.joints]
+        if missing := [joint for joint in used if joint not in self.names]:
+            raise DatasetError(f"No dimension is named {', '.join(missing)}. Valid: {', '.join(self.names)}.")
+        if twice := sorted({joint for joint in used if used.count(joint) > 1}):
+            raise DatasetError(f"A dimension can move one joint only: {', '.join(twice)}.")
+        if len({part.label for part in self.parts}) != len(self.parts):
+            raise DatasetError("Several arms need labels that differ.")
+        for part in self.parts:
+            if len(part.motors.joints) != part.space.arm.dof:
+                raise DatasetError(
+                    f"{part.space.arm.name} has {part.space.arm.dof} joints ({', '.join(part.space.arm.joints)}), "
+                    f"but {len(part.motors.joints)} dimensions are given: {', '.join(part.motors.joints)}."
+                )
+        if len(set(self.encoded_names)) != len(self.encoded_names):
+            raise DatasetError(f"Encoded, two dimensions would have one name: {', '.join(self.encoded_names)}.")
+
+    @classmethod
+    def of_space(cls, space: ActionSpace) -> "Layout":
+        """One arm, its joints [rad] in order, then the gripper: what er_il records."""
+        names = JointSpace(space.arm).names
+        return cls(names, (Part("", space, Motors(names[:-1], state=names[:-1])),))
+
+    @property
+    def kind(self) -> str:
+        """Kind of action space, the same for all arms."""
+        return self.parts[0].space.spec()["space"]
+
+    @cached_property
+    def passed(self) -> tuple[str, ...]:
+        """Names of the dimensions that belong to no arm."""
+        used = {joint for part in self.parts for joint in part.motors.joints}
+        return tuple(name for name in self.names if name not in used)
+
+    @cached_property
+    def encoded_names(self) -> tuple[str, ...]:
+        """Names of the dimensions of the encoded vector."""
+        if self._joints:
+            return self.names
+        return (*(name for part in self.parts for name in part.names), *self.passed)
+
+    @cached_property
+    def _joints(self) -> bool:
+        return self.kind == JointSpace.kind
+
+    def indices(self, part: Part) -> list[int]:
+        """Positions of an arm's joints in the joint vector."""
+        return self._indices[part.label]
+
+    @cached_property
+    def _indices(self) -> dict[str, list[int]]:
+        return {part.label: [self.names.index(joint) for joint in part.motors.joints] for part in self.parts}
+
+    def angles(self, part: Part, vectors: ArrayLike) -> Array:
+        """Angles (..., n) [rad] of an arm in joint vectors (..., D)."""
+        return part.motors.angles(np.asarray(vectors)[..., self.indices(part)])
+
+    def in_space(self, kind: str, rotation: str) -> "Layout":
+        """The same layout in another action space (see :func:`er_il.spaces.make_action_space`)."""
+        parts = (replace(part, space=make_action_space(kind, part.space.arm, rotation=rotation)) for part in self.parts)
+        return replace(self, parts=tuple(parts))
+
+    def encode(self, vectors: ArrayLike) -> Array:
+        """Encode joint vectors (T, D) of one episode in time order, as (T, len(encoded_names))."""
+        batch = np.asarray(vectors, dtype=np.float64)
+        if batch.ndim != 2 or batch.shape[1] != len(self.names):
+            raise ShapeError("Joint vectors", batch.shape, f"(T, {len(self.names)})")
+        if self._joints:
+            return batch
+        commands = [part.space.encode(self.angles(part, batch))[:, :-1] for part in self.parts]
+        return np.column_stack([*commands, batch[:, self._passed_indices]])
+
+    def decode(self, action: ArrayLike, seed: ArrayLike, current: ArrayLike | None = None) -> LayoutDecoded:
+        """Decode one encoded vector to a joint vector near a seed.
+
+        Args:
+            action: (len(encoded_names),).
+            seed: (D,) measured values; those of dimensions that belong to no arm are not read.
+            current: (D,) the last command, which a delta counts from; the seed if omitted.
+        """
+        command, start = np.asarray(action, dtype=np.float64), np.asarray(seed, dtype=np.float64)
+        if command.shape != (len(self.encoded_names),):
+            raise ShapeError("An encoded vector", command.shape, f"({len(self.encoded_names)},)")
+        last = start if current is None else np.asarray(current, dtype=np.float64)
+        vector, decoded, at = np.empty(len(self.names)), [], 0
+        vector[self._passed_indices] = command[
+            self._passed_indices if self._joints else slice(len(command) - len(self.passed), None)
+        ]
+        for part in self.parts:
+            width = len(part.names)
+            own = self.angles(part, command) if self._joints else command[at : at + width]
+            at += width
+            result = part.space.decode(np.append(own, 1.0), self.angles(part, start), self.angles(part, last))
+            vector[self.indices(part)] = part.motors.values(result.q)
+            decoded.append(result)
+        return LayoutDecoded(vector, tuple(decoded))
+
+    @cached_property
+    def _passed_indices(self) -> list[int]:
+        return [self.names.index(name) for name in self.passed]
+
+    def fitted(self, vectors: ArrayLike) -> "Layout":
+        """The same layout with the references (see :mod:`er_il.spaces.references`) that suit joint vectors (N, D)."""
+        parts = (replace(part, space=fitted(part.space, self.angles(part, vectors))) for part in self.parts)
+        return replace(self, parts=tuple(parts))
+
+    def spec(self) -> dict[str, Any]:
+        """Describe the layout as JSON, to travel with datasets.
+
+        What er_il records itself is described by its action space alone.
+        """
+        specs = []
+        for part in self.parts:
+            space = part.space.spec()
+            specs.append(space | {"arm": space["arm"] | arm_spec(part.space.arm)})
+        first = self.parts[0]
+        if not first.label and first.motors.plain and self.names == JointSpace(first.space.arm).names:
+            return specs[0]
+        arms = [
+            {"label": part.label, "motors": part.motors.spec(), **spec}
+            for part, spec in zip(self.parts, specs, strict=True)
+        ]
+        return {
+            "version": SPEC_VERSION,
+            "space": self.kind,
+            "names": list(self.encoded_names),
+            "joint_names": list(self.names),
+            "arms": arms,
+        }
+
+    @classmethod
+    def from_spec(cls, spec: Mapping[str, Any]) -> "Layout":
+        """Rebuild the layout that :meth:`spec` described.
+
+        Raises:
+            SpecError: the specification is of another version, incomplete, or does not fit its arm.
+        """
+        try:
+            if "arms" not in spec:
+                return cls.of_space(from_spec(spec, arm_from_spec(spec["arm"])))
+            parts = (
+                Part(each["label"], from_spec(each, arm_from_spec(each["arm"])), Motors.from_spec(each["motors"]))
+                for each in spec["arms"]
+            )
+            return cls(tuple(spec["joint_names"]), tuple(parts))
+        except (KeyError, TypeError) as error:
+            raise SpecError(f"The action spec is incomplete or damaged ({error}).") from error

@@ -1,1 +1,0 @@
-"""Studies of the action spaces: which actions are invalid, and which joints ERJ should command."""

@@ -1,0 +1,1 @@
+"""The scripted leader: motion planning and playing."""

@@ -1,0 +1,40 @@
+"""Whether a configuration of the arm is clear of what stands around it."""
+
+from collections.abc import Mapping
+
+import mujoco
+import numpy as np
+
+from er_il.arms.arm import Arm, Vector
+from sim_tasks.world.robot import RobotModel
+
+
+class Collisions:
+    """Checks joint angles against a world, with a margin all around the robot."""
+
+    def __init__(self, spec: mujoco.MjSpec, arm: Arm, obstacles: tuple[str, ...], clearance: float) -> None:
+        """Compile a copy of the world in which the robot is ``clearance`` [m] thicker."""
+        thick = spec.copy()
+        for geom in thick.body(arm.base_frame).find_all(mujoco.mjtObj.mjOBJ_GEOM):
+            geom.margin = clearance
+        self._model = thick.compile()
+        self._data = mujoco.MjData(self._model)
+        self._robot = RobotModel.of(self._model, arm)
+        self._obstacles = np.array([self._model.body(name).id for name in obstacles])
+        self._robot_bodies = np.array(sorted(self._robot.bodies))
+
+    def place(self, poses: Mapping[str, np.ndarray]) -> None:
+        """Put free bodies where they are now: name -> qpos (7,) of its free joint."""
+        for name, qpos in poses.items():
+            self._data.joint(name).qpos = qpos
+
+    def is_free(self, q: Vector) -> bool:
+        """Whether the arm at q (n,) [rad], gripper open, clears the obstacles and itself."""
+        self._robot.place(self._data, q, 1.0)
+        mujoco.mj_kinematics(self._model, self._data)
+        mujoco.mj_comPos(self._model, self._data)
+        mujoco.mj_collision(self._model, self._data)
+        bodies = self._model.geom_bodyid[self._data.contact.geom].reshape(-1, 2)
+        robot = np.isin(bodies, self._robot_bodies)
+        obstacle = np.isin(bodies, self._obstacles)
+        return not np.any(np.all(robot | obstacle, axis=1) & np.any(robot, axis=1))

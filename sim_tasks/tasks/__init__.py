@@ -1,0 +1,1 @@
+"""Tasks: what each builds, places, judges and rewards."""

@@ -1,0 +1,1 @@
+"""MuJoCo worlds: the robot, its surroundings, cameras and contacts."""
