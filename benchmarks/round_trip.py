@@ -15,7 +15,7 @@ import tyro
 from arms import REDUNDANT
 from rich.progress import Progress
 
-from er_il import make_action_space
+from er_il.spaces.registry import make_arm_space
 from er_il.spaces.round_trip import CAUSES, EXACT, SINGULAR, round_trips
 from er_il.support.atomic_files import write_json
 from er_il.support.provenance import provenance
@@ -28,7 +28,7 @@ SEED_ERRORS = (0.1, 0.03)  # [rad]
 def measure(name: str, kind: str, seed_error: float, samples: int) -> dict[str, object]:
     """One row of the report."""
     arm = REDUNDANT[name]()
-    trips = round_trips(make_action_space(kind, arm), samples, seed_error=seed_error)
+    trips = round_trips(make_arm_space(kind, arm), samples, seed_error=seed_error)
     missed = [trip for trip in trips if not trip.exact]
     causes = Counter(trip.cause for trip in missed)
     return {

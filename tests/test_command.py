@@ -1,8 +1,10 @@
 import numpy as np
 import pytest
 
-from er_il import Arm, Status, make_action_space
+from er_il import Arm, Status
 from er_il.control.commander import Commander
+from er_il.spaces.delta import DeltaBounds
+from er_il.spaces.registry import make_arm_space
 from er_il.support.errors import ErIlError, UnknownNameError
 
 PANDA = Arm.preset("panda")
@@ -11,18 +13,17 @@ REACH = PANDA.velocity * PERIOD
 
 
 def commander(kind: str = "joint", on_invalid: str = "best_effort") -> Commander:
-    made = Commander(make_action_space(kind, PANDA), PERIOD, on_invalid)
-    made.reset(PANDA.home, gripper=0.4)
+    made = Commander(make_arm_space(kind, PANDA), PERIOD, on_invalid)
+    made.reset(PANDA.home)
     return made
 
 
 def test_a_valid_action_within_reach_is_followed_exactly():
     erj = commander("erj")
     goal = PANDA.home + 0.4 * REACH
-    command = erj.command(erj.space.encode(goal, 0.7), PANDA.home)
+    command = erj.command(erj.space.encode(goal), PANDA.home)
     assert command.status is Status.OK
     np.testing.assert_allclose(command.q, goal, atol=1e-3)
-    assert command.gripper == pytest.approx(0.7)
 
 
 def test_the_velocity_limit_holds_between_successive_commands_and_keeps_the_direction():
@@ -49,7 +50,7 @@ def test_whatever_the_policy_says_the_command_is_safe(kind: str, on_invalid: str
         if step % 11 == 0:
             action[:] = 0.0
         command = made.command(action, q)
-        assert np.all(np.isfinite(command.q)) and 0.0 <= command.gripper <= 1.0
+        assert np.all(np.isfinite(command.q))
         assert np.all(command.q >= PANDA.lower) and np.all(command.q <= PANDA.upper)
         assert np.all(np.abs(command.q - last) <= REACH + 1e-9)
         last, q = command.q, command.q
@@ -57,14 +58,13 @@ def test_whatever_the_policy_says_the_command_is_safe(kind: str, on_invalid: str
     assert made.tally.invalid > 0
 
 
-def test_an_action_that_means_nothing_moves_neither_arm_nor_gripper():
+def test_an_action_that_means_nothing_leaves_the_last_command():
     task = commander("task")
     sagging = PANDA.home + 0.01
-    for action in (np.full(8, np.nan), np.array([0.5, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 1.0])):  # a zero quaternion
+    for action in (np.full(7, np.nan), np.array([0.5, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0])):  # a zero quaternion
         command = task.command(action, sagging)
         assert command.status is Status.INVALID
         np.testing.assert_array_equal(command.q, PANDA.home)
-        assert command.gripper == pytest.approx(0.4)
 
 
 def test_lost_measurements_hold_the_arm():
@@ -85,32 +85,34 @@ def test_a_solution_on_another_branch_is_a_jump():
     assert joint.command(joint.space.encode(near), PANDA.home).status is Status.OK
 
 
+@pytest.mark.parametrize("delta", ["", "delta_"])
 @pytest.mark.parametrize(
     ("kind", "error", "arrives"), [("era", 0.02, False), ("era", -0.02, False), ("erj", 0.8, True), ("erj", -0.8, True)]
 )
-def test_towards_an_elbow_far_away_the_pose_is_kept(kind: str, error: float, arrives: bool):
+def test_towards_an_elbow_far_away_the_pose_is_kept(kind: str, error: float, arrives: bool, delta: str):
     # The upper arm stands upright, where joints 1 and 3 turn it alike: the arm angle hardly says which of them turns.
     q = np.array([0.1, -0.01, -0.1, -1.96, 0.07, 3.17, 0.72])
-    made = commander(kind)
+    made = Commander(make_arm_space(delta + kind, PANDA, bounds=DeltaBounds(angle=0.8)), PERIOD)
     made.reset(q)
-    action = made.space.encode(q)
-    action[7] += error
+    action = made.space.encode(q)  # a delta's is zero
+    action[-1] += error
     pose, start = made.space.fk(q), q
     statuses = []
-    for _ in range(30):
+    for _ in range(1 if delta else 30):
         command = made.command(action, q)
         statuses.append(command.status)
         q = command.q
         np.testing.assert_allclose(made.space.fk(q)[:3, 3], pose[:3, 3], atol=2e-3)
     assert statuses[0] is Status.JUMP
-    if arrives:
+    assert np.all(np.abs(q - start) <= REACH * len(statuses) + 1e-9)
+    if arrives and not delta:
         assert statuses[-1] is Status.OK
         assert q[0] - start[0] == pytest.approx(error, abs=1e-3)
 
 
 def test_best_effort_approaches_hold_waits_and_stop_stays():
     best, hold, stop = commander(), commander(on_invalid="hold"), commander(on_invalid="stop")
-    jump, fine = best.space.encode(far_away(), 0.0), best.space.encode(PANDA.home + 0.5 * REACH, 0.0)
+    jump, fine = best.space.encode(far_away()), best.space.encode(PANDA.home + 0.5 * REACH)
     assert best.command(jump, PANDA.home).q[2] == pytest.approx(PANDA.home[2] + REACH[2])
     np.testing.assert_array_equal(hold.command(jump, PANDA.home).q, PANDA.home)
     np.testing.assert_allclose(hold.command(fine, PANDA.home).q, PANDA.home + 0.5 * REACH)
@@ -137,7 +139,7 @@ def test_an_unreachable_target_is_counted_and_answered_in_bounded_steps():
 
 
 def test_mistakes_name_the_choices():
-    space = make_action_space("joint", PANDA)
+    space = make_arm_space("joint", PANDA)
     with pytest.raises(UnknownNameError, match="best_effort, hold, stop"):
         Commander(space, PERIOD, "panic")
     with pytest.raises(ErIlError, match="positive"):
@@ -150,7 +152,7 @@ def test_a_delta_counts_from_the_last_command_not_from_where_the_arm_sags_to():
     delta = commander("delta_joint")
     change = 0.1 * REACH
     for step in (1, 2):
-        command = delta.command(np.append(change, 1.0), PANDA.home - 0.01)
+        command = delta.command(change, PANDA.home - 0.01)
         np.testing.assert_allclose(command.q, PANDA.home + step * change, atol=1e-9)
 
 

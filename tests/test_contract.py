@@ -4,16 +4,17 @@ from pathlib import Path
 import pytest
 from lerobot.policies.act.configuration_act import ACTConfig
 
-from er_il import Arm, make_action_space
+from er_il import Arm
 from er_il.datasets.schema import action_feature
 from er_il.envs.contract import Contract, check_policy, policy_contract
-from er_il.spaces import ActionSpace
+from er_il.spaces.action_space import ActionSpace
 from er_il.spaces.layout import Layout
+from er_il.spaces.registry import make_arm_space
 from er_il.support.errors import PolicyError
 from er_il.support.resources import data_dir
 
 PANDA = Arm.preset("panda")
-SPACES = {kind: make_action_space(kind, PANDA) for kind in ("joint", "task", "erj")}
+SPACES = {kind: make_arm_space(kind, PANDA) for kind in ("joint", "task", "erj")}
 
 
 def policy(folder: Path, *, tags: list[str] | None = None, dataset: Path | None = None) -> Path:
@@ -37,7 +38,7 @@ def test_the_tag_says_everything_that_actions_depend_on():
     assert Contract.of_space(SPACES["task"]).tag == "er_il:task/panda/panda_hand_tcp/quat/-"
     assert Contract.of_space(SPACES["joint"]).tag == "er_il:joint/panda/panda_hand_tcp/-/-"
     other_joint = Arm.from_urdf(PANDA.urdf, ee_frame="panda_link8", redundant=["panda_joint3"], name="panda")
-    assert Contract.of_space(make_action_space("erj", other_joint, rotation="rot6d")).tag == (
+    assert Contract.of_space(make_arm_space("erj", other_joint, rotation="rot6d")).tag == (
         "er_il:erj/panda/panda_link8/rot6d/panda_joint3"
     )
 

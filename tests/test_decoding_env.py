@@ -5,7 +5,7 @@ from gymnasium.utils.env_checker import check_env
 
 from er_il.envs.decoders import DECODERS, Decoder, decoder
 from er_il.envs.tasks import task_id, task_names
-from er_il.envs.wrapper import make_decoding_env
+from er_il.envs.wrapper import make_action_space_env
 from er_il.support.errors import UnknownNameError
 
 REACH = task_id("reach_cup")
@@ -29,21 +29,21 @@ def test_reports_know_every_space_and_both_decoders_of_task_space():
 @pytest.mark.filterwarnings("ignore:.*(Box action space|unwrapped version):UserWarning")
 @pytest.mark.parametrize("name", ["joint", "erj", "task-nearest", "task-posture"])
 def test_it_is_a_gymnasium_environment(name: str):
-    env = make_decoding_env(REACH, DECODERS[name])
+    env = make_action_space_env(REACH, DECODERS[name])
     check_env(env, skip_render_check=True)
     env.close()
 
 
 def test_encoded_actions_move_the_arm_as_joint_targets_do():
     plain = gymnasium.make(REACH)
-    encoded = make_decoding_env(REACH, DECODERS["erj"])
+    encoded = make_action_space_env(REACH, DECODERS["erj"])
     plain.reset(seed=3)
     encoded.reset(seed=3)
     start = plain.unwrapped.joint_positions  # pyright: ignore[reportAttributeAccessIssue]
     for step in range(1, 15):
         q = start + 0.01 * step * np.array([-1, 1, 0.5, 0.5, 0, 0, 0.5])
         plain.step(np.append(q, 0.5).astype(np.float32))
-        _, _, _, _, info = encoded.step(encoded.space.encode(q, 0.5).astype(np.float32))
+        _, _, _, _, info = encoded.step(np.append(encoded.space.encode(q), 0.5).astype(np.float32))
         assert info["decode_status"] == "ok"
         assert info["joint_step"] == pytest.approx(0.01, abs=2e-3)
     np.testing.assert_allclose(
@@ -54,19 +54,19 @@ def test_encoded_actions_move_the_arm_as_joint_targets_do():
 
 
 def test_a_reset_forgets_the_last_episode():
-    env = make_decoding_env(REACH, DECODERS["joint"], on_invalid="stop")
+    env = make_action_space_env(REACH, DECODERS["joint"], on_invalid="stop")
     first, _ = env.reset(seed=5)
     env.step(np.full(8, np.nan, dtype=np.float32))
     second, _ = env.reset(seed=5)
     np.testing.assert_array_equal(first["agent_pos"], second["agent_pos"])
     q = env.unwrapped.joint_positions  # pyright: ignore[reportAttributeAccessIssue]
-    _, _, terminated, _, info = env.step(env.space.encode(q).astype(np.float32))
+    _, _, terminated, _, info = env.step(np.append(env.space.encode(q), 1.0).astype(np.float32))
     assert not terminated
     assert info["decode_status"] == "ok"
 
 
 def test_stop_ends_the_episode_as_an_invalid_action():
-    env = make_decoding_env(REACH, DECODERS["erj"], on_invalid="stop")
+    env = make_action_space_env(REACH, DECODERS["erj"], on_invalid="stop")
     env.reset(seed=0)
     _, _, terminated, truncated, info = env.step(np.full(9, np.nan, dtype=np.float32))
     assert terminated and not truncated
@@ -75,7 +75,7 @@ def test_stop_ends_the_episode_as_an_invalid_action():
 
 @pytest.mark.parametrize("on_invalid", ["best_effort", "hold"])
 def test_the_arm_keeps_still_while_actions_mean_nothing(on_invalid: str):
-    env = make_decoding_env(REACH, DECODERS["erj"], on_invalid=on_invalid)
+    env = make_action_space_env(REACH, DECODERS["erj"], on_invalid=on_invalid)
     env.reset(seed=0)
     start = env.unwrapped.joint_positions  # pyright: ignore[reportAttributeAccessIssue]
     for _ in range(10):

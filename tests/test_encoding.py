@@ -10,8 +10,8 @@ from er_il.arms.arm import Arm
 from er_il.datasets.encoding import encode_dataset
 from er_il.datasets.normalisation import loosen_rotations
 from er_il.datasets.schema import LEADER_JOINTS, action_feature
-from er_il.spaces import make_action_space
 from er_il.spaces.layout import Layout
+from er_il.spaces.registry import make_arm_space
 from er_il.spaces.spec import ACTION
 from er_il.support.errors import DatasetError
 
@@ -46,7 +46,7 @@ def _write(root, kind, leader=False):
 
 
 def _layout(kind):
-    return Layout.of_space(make_action_space(kind, PANDA))
+    return Layout.of_space(make_arm_space(kind, PANDA))
 
 
 def _state():

@@ -7,8 +7,9 @@ import pytest
 from chains import chain_arm
 
 from er_il import Arm
+from er_il.kinematics.arm_angle import ArmAngle
+from er_il.kinematics.redundancy import JointAngle
 from er_il.kinematics.solver import kinematics_of
-from er_il.spaces import make_action_space
 from er_il.spaces.joint_choice import (
     FLIP,
     along_demos,
@@ -20,6 +21,7 @@ from er_il.spaces.joint_choice import (
     sensitivities,
     stretches,
 )
+from er_il.spaces.registry import make_arm_space
 from er_il.spaces.round_trip import SINGULAR
 from er_il.support.errors import ArmError
 
@@ -37,7 +39,7 @@ def elbow_turn(degrees: np.ndarray) -> np.ndarray:
     """The Panda's hand stays at home while its elbow goes through arm angles."""
     kinematics, path = kinematics_of(PANDA), [PANDA.home]
     for angle in np.radians(degrees):
-        path.append(kinematics.solve(kinematics.fk(PANDA.home), path[-1], arm_angle=float(angle)).q)
+        path.append(kinematics.solve(kinematics.fk(PANDA.home), path[-1], ArmAngle(PANDA), [angle]).q)
     return np.array(path[1:])
 
 
@@ -89,7 +91,9 @@ def test_what_is_left_to_ik_shrinks_with_the_share_of_self_motion(tmp_path, join
         left = np.delete(jacobians, [arm.joints.index(joint) for joint in choice], axis=2)
         np.testing.assert_allclose(np.linalg.det(left), sensitivity.self_motion * whole, atol=1e-9)
         np.testing.assert_allclose(
-            sensitivity.smallest, [kinematics_of(arm).conditioning(each, choice) for each in q], atol=1e-9
+            sensitivity.smallest,
+            [kinematics_of(arm).conditioning(each, JointAngle(arm, choice)) for each in q],
+            atol=1e-9,
         )
 
 
@@ -124,7 +128,7 @@ def test_a_demo_past_the_highest_elbow_crosses_the_folds_of_bending_joints_only(
 
 def test_playback_follows_a_demo_and_is_the_same_each_time():
     demo = elbow_turn(np.linspace(-40, 40, 40))
-    good, bad = (make_action_space(f"erj@panda_joint{i}", PANDA) for i in (1, 4))
+    good, bad = (make_arm_space(f"erj@panda_joint{i}", PANDA) for i in (1, 4))
     distances = play_back(good, demo, np.random.default_rng(0))
     assert 1e-3 < distances.max() < FLIP
     assert play_back(bad, demo, np.random.default_rng(0)).max() > FLIP

@@ -64,7 +64,7 @@ def test_an_episode_that_has_ended_waits_without_leaking_its_successor():
         assert reward[0] == 0
         assert info["failure"][0] == "invalid_action"
         assert not info["is_success"][0]
-    assert [len(c.tally.latencies) for c in vector.get_attr("commander")] == [1, 4]
+    assert [len(tally.latencies) for tally in vector.get_attr("tally")] == [1, 4]
     vector.close()
 
 

@@ -25,16 +25,17 @@ from lerobot.scripts import lerobot_record
 from lerobot.utils.import_utils import register_third_party_plugins
 from operating import EPISODE_TIME, right_arrow_after
 
-from er_il import Arm, make_action_space
+from er_il import Arm
 from er_il.robots.processors import DecodePolicyAction, DecodeRobotAction
 from er_il.spaces.layout import Layout, Part
 from er_il.spaces.motors import Motors
+from er_il.spaces.registry import make_arm_space
 from er_il.support.errors import ErIlError, ShapeError
 
 PANDA = Arm.preset("panda")
 JOINTS = tuple(f"{joint}.pos" for joint in PANDA.joints)
 LAYOUT = Layout(
-    (*JOINTS, "gripper.pos"), (Part("", make_action_space("erj", PANDA), Motors(JOINTS, "deg", state=JOINTS)),)
+    (*JOINTS, "gripper.pos"), (Part("", make_arm_space("erj", PANDA), Motors(JOINTS, "deg", state=JOINTS)),)
 )
 PERIOD = 0.05
 REACH = PANDA.velocity * PERIOD

@@ -5,7 +5,7 @@ import pytest
 from playing import play
 
 from er_il.kinematics.solver import Status, kinematics_of
-from er_il.spaces import make_action_space
+from er_il.spaces.action_space import make_action_space
 from sim_tasks.tasks.push_button_elbow import BUTTON, DEPTH, PEDESTAL, PRESSED, PushButtonElbow
 
 STEPS = 25  # control steps from one of the hand's places to the next

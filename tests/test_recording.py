@@ -17,7 +17,7 @@ from er_il.datasets.recipe import Recipe
 from er_il.datasets.record import Record
 from er_il.datasets.recording import generate
 from er_il.datasets.schema import DEMO_SEED, ENVIRONMENT_STATE, LEADER_JOINTS, STATE
-from er_il.spaces import from_spec
+from er_il.spaces.action_space import from_spec
 from er_il.spaces.spec import ACTION, action_spec
 from er_il.support.errors import DatasetError, UnknownNameError
 

@@ -3,10 +3,11 @@ import logging
 import numpy as np
 import pytest
 
-from er_il import Arm, make_action_space
-from er_il.control.vector_commander import RobotCommander
+from er_il import Arm
+from er_il.robots.robot_commander import RobotCommander
 from er_il.spaces.layout import Layout, Part
 from er_il.spaces.motors import Motors
+from er_il.spaces.registry import make_arm_space
 from er_il.support.errors import ErIlError, ShapeError, UnknownNameError
 
 PANDA, XARM = Arm.preset("panda"), Arm.preset("xarm7")
@@ -20,7 +21,7 @@ NAMES = ("lift.pos", *RIGHT.joints[::-1], "right_gripper.pos", *LEFT.joints[3:],
 
 def layout(kind: str) -> Layout:
     arms = (("left", PANDA, LEFT), ("right", XARM, RIGHT))
-    return Layout(NAMES, tuple(Part(label, make_action_space(kind, arm), motors) for label, arm, motors in arms))
+    return Layout(NAMES, tuple(Part(label, make_arm_space(kind, arm), motors) for label, arm, motors in arms))
 
 
 def vector(left: np.ndarray, right: np.ndarray, lift: float = 3.0, gripper: float = 40.0) -> np.ndarray:

@@ -6,9 +6,9 @@ from chains import chain_arm, write_chain
 from scipy.spatial.transform import Rotation
 
 from er_il import ActionSpace, Arm, ArmAngleFrames, Status, from_spec, make_action_space
-from er_il.spaces import name_of
+from er_il.spaces.pose import POSTURE_PULL
+from er_il.spaces.registry import name_of
 from er_il.spaces.round_trip import EXACT, SINGULAR, UNEXPLAINED, RoundTrip, round_trips
-from er_il.spaces.task import POSTURE_PULL
 from er_il.support.errors import ArmError, ErIlError, ShapeError, SpecError, UnknownNameError
 
 PANDA = Arm.preset("panda")
@@ -28,7 +28,7 @@ def assert_returns_joints(space: ActionSpace, trips: list[RoundTrip], share: flo
 
 
 def test_joint_space_returns_the_joints_always():
-    for trip in round_trips(make_action_space("joint", PANDA), 100):
+    for trip in round_trips(make_action_space("joint", PANDA).arm_space, 100):
         np.testing.assert_array_equal(trip.decoded.q, trip.q)
         assert trip.decoded.status is Status.OK
 
@@ -37,7 +37,7 @@ def test_joint_space_returns_the_joints_always():
 @pytest.mark.parametrize(("kind", "seed_error", "share"), [("erj", 0.1, 0.98), ("era", 0.1, 0.98), ("erj", 0.03, 0.99)])
 def test_er_spaces_return_the_joints(kind, seed_error, share, rotation):
     space = make_action_space(kind, PANDA, rotation=rotation)
-    assert_returns_joints(space, round_trips(space, 500, seed_error=seed_error), share)
+    assert_returns_joints(space, round_trips(space.arm_space, 500, seed_error=seed_error), share)
 
 
 @pytest.mark.parametrize("kind", ["erj", "era"])
@@ -55,7 +55,7 @@ def test_er_spaces_return_the_joints_from_seeds_a_tenth_of_a_radian_away(kind):
 @pytest.mark.parametrize("kind", ["erj", "era"])
 def test_er_spaces_return_the_joints_wherever_the_arm_is_well_conditioned(kind):
     space = make_action_space(kind, PANDA)
-    trips = [trip for trip in round_trips(space, 400, rng_seed=1) if trip.conditioning >= SINGULAR]
+    trips = [trip for trip in round_trips(space.arm_space, 400, rng_seed=1) if trip.conditioning >= SINGULAR]
     assert len(trips) > 100
     assert all(trip.exact for trip in trips)
 
@@ -63,7 +63,7 @@ def test_er_spaces_return_the_joints_wherever_the_arm_is_well_conditioned(kind):
 def test_what_erj_misses_has_a_second_solution_nearer_the_seed():
     """So no decoder that knows only the action and the seed could have told: the share's ceiling."""
     space = make_action_space("erj", PANDA)
-    trips = round_trips(space, 1500, rng_seed=2)
+    trips = round_trips(space.arm_space, 1500, rng_seed=2)
     assert any(trip.ambiguous for trip in trips)
     assert np.mean([trip.exact or trip.ambiguous for trip in trips]) >= 0.998
 
@@ -86,7 +86,7 @@ def test_task_space_returns_the_pose_and_not_the_joints(posture):
 def test_erj_on_continuous_joints(tmp_path):
     arm = Arm.from_urdf(write_chain(tmp_path / "endless.urdf", 7, kind="continuous"), ee_frame="tool")
     space = make_action_space("erj", arm)
-    assert_returns_joints(space, round_trips(space, 100, seed_error=0.05), 0.93)
+    assert_returns_joints(space, round_trips(space.arm_space, 100, seed_error=0.05), 0.93)
     beyond = np.r_[6.0, np.full(6, 0.4)]  # past half a turn: the seed's turn is kept
     np.testing.assert_allclose(space.decode(space.encode(beyond), beyond + 0.02).q, beyond, atol=EXACT)
 
@@ -96,7 +96,7 @@ def test_erj_on_random_chains(tmp_path, joints):
     for seed in range(3):
         space = make_action_space("erj", chain_arm(tmp_path, joints, seed))
         assert space.dim == 3 + 4 + (joints - 6) + 1
-        assert_returns_joints(space, round_trips(space, 150, rng_seed=seed), 0.96)
+        assert_returns_joints(space, round_trips(space.arm_space, 150, rng_seed=seed), 0.96)
 
 
 def test_era_on_random_chains(tmp_path):
@@ -104,7 +104,7 @@ def test_era_on_random_chains(tmp_path):
         urdf = write_chain(tmp_path / f"chain{seed}.urdf", 7, seed)
         frames = ArmAngleFrames(shoulder="l2", elbow="l4", wrist="l6")
         space = make_action_space("era", Arm.from_urdf(urdf, ee_frame="tool", angle_frames=frames))
-        assert_returns_joints(space, round_trips(space, 150, rng_seed=seed), 0.96)
+        assert_returns_joints(space, round_trips(space.arm_space, 150, rng_seed=seed), 0.96)
 
 
 # ---------------------------------------------------------------- shapes, names, batches

@@ -34,7 +34,7 @@ def train(
     from er_il.envs.tasks import task_id
     from er_il.policy.configuration import default_config, default_steps
     from er_il.policy.training import Training
-    from er_il.spaces import check_space
+    from er_il.spaces.registry import check_space
 
     task_id(task)
     check_space(space)

@@ -1,4 +1,4 @@
-"""From what a policy says to what the arm may do: the last step before a robot, simulated or real."""
+"""The commander of one arm: actions decoded, checked, and limited to what the arm can do in a control period."""
 
 import time
 from collections import Counter
@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from er_il.arms.arm import Vector
-from er_il.kinematics.solver import Status
-from er_il.spaces import ActionSpace, Decoded
-from er_il.spaces.pose import PoseSpace
+from er_il.kinematics.solver import IkResult, Status
+from er_il.spaces.base import ArmSpace
 from er_il.support.errors import ErIlError, ShapeError, UnknownNameError
 
 BEST_EFFORT, HOLD, STOP = "best_effort", "hold", "stop"
@@ -20,23 +19,28 @@ LEAD_PERIODS = 4  # an arm that is held up is told no further than it gets in th
 JUMP_PERIODS = 5  # a solution this many periods away at full speed is on another branch, not on the way
 
 
+def check_answer(on_invalid: str) -> None:
+    """Raise an :class:`UnknownNameError` unless a name is that of an answer to invalid actions."""
+    if on_invalid not in ON_INVALID:
+        raise UnknownNameError("answer to invalid actions", on_invalid, ON_INVALID)
+
+
 @dataclass(frozen=True)
 class Command:
-    """What the arm is told in one control period."""
+    """The joint command of one control period."""
 
     q: Vector  # (n,) [rad] finite, within the joint limits and the velocity limit
-    gripper: float  # in [0, 1], 1 open
     status: Status  # of the action it came from
     latency: float  # [s] time the decoding took
     iters: int  # iterations of IK that it took
     joint_step: float  # [rad] largest joint change that was asked for, before the velocity limit
-    followed: bool  # the arm goes where the action says, or as near as it can; else the last command stands
+    followed: bool  # the arm moves as the action says, or as nearly as it can; else the last command stands
     stopped: bool = False  # the arm holds until the next reset
 
 
 @dataclass
 class Tally:
-    """What happened since the last reset."""
+    """Counts since the last reset."""
 
     statuses: Counter[Status] = field(default_factory=Counter)
     latencies: list[float] = field(default_factory=list)  # [s] one a command
@@ -49,12 +53,12 @@ class Tally:
 
 
 class Commander:
-    """Decodes actions, checks them, and limits them to what the arm can do in a control period.
+    """Decodes the actions of one arm, checks them, and limits them to what it can do in a control period.
 
     An action that is not OK is answered as declared by ``on_invalid``:
 
     - ``best_effort``: go as near to it as limits and IK allow, at no more than full speed, and of an
-      elbow far away towards it only as far as the pose is kept (:meth:`PoseSpace.ease`); an action
+      elbow far away towards it only as far as the pose is kept (:meth:`ArmSpace.ease`); an action
       that means nothing (``Status.INVALID``) leaves the last command standing.
     - ``hold``: the last command stands.
     - ``stop``: the last command stands until the next reset.
@@ -63,7 +67,7 @@ class Commander:
     has come near it, or the action leads back.
     """
 
-    def __init__(self, space: ActionSpace, period: float, on_invalid: str = BEST_EFFORT) -> None:
+    def __init__(self, space: ArmSpace, period: float, on_invalid: str = BEST_EFFORT) -> None:
         """Prepare a commander; :meth:`reset` starts it.
 
         Args:
@@ -74,8 +78,7 @@ class Commander:
         Raises:
             UnknownNameError: ``on_invalid`` is none of these.
         """
-        if on_invalid not in ON_INVALID:
-            raise UnknownNameError("answer to invalid actions", on_invalid, ON_INVALID)
+        check_answer(on_invalid)
         if not period > 0:
             raise ErIlError(f"The control period is {period} s; it must be positive.")
         self.space = space
@@ -83,16 +86,15 @@ class Commander:
         self.tally = Tally()
         self._reach = space.arm.velocity * period  # (n,) [rad] a period's way at full speed
         self._last: Vector | None = None
-        self._gripper = 1.0
         self._stopped = False
 
-    def reset(self, q: ArrayLike, gripper: float = 1.0) -> None:
-        """Start an episode from the measured joint angles q (n,) [rad] and gripper opening."""
-        self.anchor(q, gripper)
+    def reset(self, q: ArrayLike) -> None:
+        """Start an episode from the measured joint angles q (n,) [rad]."""
+        self.anchor(q)
         self._stopped = False
         self.tally = Tally()
 
-    def anchor(self, q: ArrayLike, gripper: float = 1.0) -> None:
+    def anchor(self, q: ArrayLike) -> None:
         """Go on from joint angles q (n,) [rad], wherever the last command was: something else moved the arm."""
         arm = self.space.arm
         start = np.array(q, dtype=np.float64)
@@ -101,14 +103,13 @@ class Commander:
         if not np.all(np.isfinite(start)):
             raise ErIlError("The measured joint angles are not finite; no safe command can start from them.")
         self._last = np.clip(start, arm.lower, arm.upper)
-        self._gripper = float(np.clip(gripper, 0.0, 1.0))
 
     def stop(self) -> None:
         """Let the last command stand until the next reset."""
         self._stopped = True
 
     def strayed(self, q: ArrayLike) -> bool:
-        """Whether the arm is elsewhere than any command of these periods could have left it.
+        """True if the arm is elsewhere than any command of these periods could have left it.
 
         A person moved it, or another program: the velocity limit must then count from where it is.
         """
@@ -131,36 +132,36 @@ class Commander:
         follows = follows and not self._stopped and not self._runs_away(ahead, q)
         if follows:
             self._last = ahead
-            self._gripper = decoded.gripper
         self.tally.statuses[status] += 1
         self.tally.latencies.append(latency)
         self.tally.largest_step = max(self.tally.largest_step, asked)
-        return Command(self._last.copy(), self._gripper, status, latency, decoded.iters, asked, follows, self._stopped)
+        return Command(self._last.copy(), status, latency, decoded.iters, asked, follows, self._stopped)
 
-    def _decode(self, action: ArrayLike, q: ArrayLike) -> Decoded:
+    def _decode(self, action: ArrayLike, q: ArrayLike) -> IkResult:
         measured = np.asarray(q, dtype=np.float64)
         assert self._last is not None
         if not np.all(np.isfinite(measured)):
-            return Decoded(self._last, self._gripper, Status.INVALID)
+            return IkResult(self._last, Status.INVALID)
         decoded = self.space.decode(action, seed=measured, current=self._last)
         if decoded.status is Status.INVALID:
-            return replace(decoded, q=self._last, gripper=self._gripper)
+            return replace(decoded, q=self._last)
         jumps = decoded.status is Status.OK and self._far(decoded.q, measured)
         return replace(decoded, status=Status.JUMP) if jumps else decoded
 
-    def _eased(self, decoded: Decoded, action: ArrayLike, q: ArrayLike) -> Vector:
-        """Where to go: what was decoded or, if that is far, as much of it as lies near with its pose."""
+    def _eased(self, decoded: IkResult, action: ArrayLike, q: ArrayLike) -> Vector:
+        """The decoded joints or, if they are far, as much of the action as lies near with its pose."""
         measured = np.asarray(q, dtype=np.float64)
-        space = self.space
-        if isinstance(space, PoseSpace) and space.redundancy_names and self._far(decoded.q, measured):
-            return space.ease(action, measured, JUMP_PERIODS * self._reach)
-        return decoded.q
+        assert self._last is not None
+        if not self._far(decoded.q, measured):
+            return decoded.q
+        eased = self.space.ease(action, measured, JUMP_PERIODS * self._reach, self._last)
+        return decoded.q if eased is None else eased
 
     def _far(self, target: Vector, measured: Vector) -> bool:
         return bool(np.any(np.abs(target - measured) > JUMP_PERIODS * self._reach))
 
     def _runs_away(self, ahead: Vector, q: ArrayLike) -> bool:
-        """Whether a command would leave behind an arm that does not come along: it waits for it instead."""
+        """True if a command would leave behind an arm that does not come along: it waits for it instead."""
         assert self._last is not None
         measured = np.asarray(q, dtype=np.float64)
         lead, before = np.abs(ahead - measured), np.abs(self._last - measured)

@@ -67,7 +67,7 @@ def _meaning(layout: Layout, name: str) -> str:
             joint = part.space.arm.joints[part.motors.joints.index(name)]
             return f"joint `{joint}` [{part.motors.units}]"
         if name in part.names:
-            own = part.space.arm_names[part.names.index(name)]
+            own = part.space.names[part.names.index(name)]
             if own in ("ee.x", "ee.y", "ee.z", "ee.dx", "ee.dy", "ee.dz"):
                 return "end-effector position [m]"
             if own.startswith("ee.q"):

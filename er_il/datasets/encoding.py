@@ -20,7 +20,7 @@ from er_il.datasets.rewriting import (
     rewrite,
 )
 from er_il.datasets.schema import LEADER_JOINTS, SOURCE_ACTION, STATE, Feature, action_feature, dimension_names
-from er_il.spaces import JointSpace
+from er_il.spaces.joint import JOINT
 from er_il.spaces.layout import Layout
 from er_il.spaces.spec import ACTION, SPEC
 from er_il.support.errors import DatasetError
@@ -72,7 +72,7 @@ def encode_dataset(
     layout = layout.fitted(vectors) if fit else layout
     with appearing(target) as partial:
         columns = {ACTION: _encoded(source, info, layout, vectors)}
-        if keep and column == ACTION and layout.kind != JointSpace.kind:
+        if keep and column == ACTION and layout.kind != JOINT:
             columns[SOURCE_ACTION] = Column(_kept(info.features[ACTION], layout), vectors)
         rewrite(source, partial, info, columns, advance)
         loosen_rotations(partial)
@@ -153,7 +153,7 @@ def joints_column(features: dict[str, Feature], layout: Layout) -> str | None:
     for column in (LEADER_JOINTS, SOURCE_ACTION, ACTION):
         if column in features and dimension_names(features[column]) == layout.names:
             spec = (features[column].get("info") or {}).get(SPEC)
-            if column != ACTION or spec is None or spec["space"] == JointSpace.kind:
+            if column != ACTION or spec is None or spec["space"] == JOINT:
                 return column
     return None
 

@@ -25,8 +25,9 @@ from er_il.datasets.normalisation import loosen_rotations, set_scales
 from er_il.datasets.recipe import Recipe
 from er_il.datasets.record import Record
 from er_il.datasets.schema import DEMO_SEED, ENVIRONMENT_STATE, IMAGES, LEADER_JOINTS, STATE, features
-from er_il.spaces import ActionSpace, check_space, make_action_space
+from er_il.spaces.base import ArmSpace
 from er_il.spaces.layout import Layout
+from er_il.spaces.registry import check_space, make_arm_space
 from er_il.spaces.spec import ACTION
 from er_il.support.errors import DatasetError
 
@@ -63,7 +64,7 @@ def generate(recipe: Recipe, spaces: Sequence[str], out: Path, progress: Progres
     asked = tuple(dict.fromkeys(spaces))
     for space in asked or ("",):
         check_space(space)
-        make_action_space(space, Arm.preset(recipe.arm))  # raises if the arm has none such
+        make_arm_space(space, Arm.preset(recipe.arm))  # raises if the arm has none such
     datasets = {info.parents[1].name for info in out.glob("*/meta/info.json")}
     existing = sorted(datasets | {space for space in asked if (out / space).exists()})
     for space in existing:
@@ -76,7 +77,7 @@ def generate(recipe: Recipe, spaces: Sequence[str], out: Path, progress: Progres
             _record(recipe, new[0], first, work, progress, workers)
         if missing := [space for space in new if out / space != first]:
             for space in progress.track(missing, description="Encode in the other spaces"):
-                encode_dataset(first, out / space, Layout.of_space(make_action_space(space, Arm.preset(recipe.arm))))
+                encode_dataset(first, out / space, Layout.of_space(make_arm_space(space, Arm.preset(recipe.arm))))
         shutil.rmtree(work, ignore_errors=True)
     return Generated({space: out / space for space in asked}, new, Record.read(first).dropped)
 
@@ -86,7 +87,7 @@ def _record(recipe: Recipe, kind: str, target: Path, work: Path, progress: Progr
     world = make_world(recipe)
     try:
         world.reset(seed=0)  # what cannot be rendered shows here, not in a worker
-        space = make_action_space(kind, Arm.preset(recipe.arm))
+        space = make_arm_space(kind, Arm.preset(recipe.arm))
         dropped: dict[int, str] = {}
         demos = _claim(work, recipe)
         writer = _Writer(recipe, world, space, work / "dataset")
@@ -108,7 +109,7 @@ def _record(recipe: Recipe, kind: str, target: Path, work: Path, progress: Progr
 class _Writer:
     """Writes demos as a LeRobot dataset."""
 
-    def __init__(self, recipe: Recipe, world: gymnasium.Env[Any, Any], space: ActionSpace, root: Path) -> None:
+    def __init__(self, recipe: Recipe, world: gymnasium.Env[Any, Any], space: ArmSpace, root: Path) -> None:
         # Without LeRobot's footers, which it writes at the end, an interrupted dataset is unreadable.
         shutil.rmtree(root, ignore_errors=True)
         self._recipe, self._space = recipe, space

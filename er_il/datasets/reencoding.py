@@ -10,7 +10,7 @@ from er_il.datasets import card
 from er_il.datasets.encoding import dataset_info, dataset_layout, decode_dataset, encode_dataset, joints_column
 from er_il.datasets.hub import find_dataset
 from er_il.datasets.wiring import Wiring, wire
-from er_il.spaces import JointSpace
+from er_il.spaces.joint import JOINT
 from er_il.spaces.layout import Layout
 from er_il.spaces.spec import ACTION, SPEC
 from er_il.support.errors import DatasetError
@@ -63,8 +63,8 @@ def reencode(
         layout = dataset_layout(info.features).in_space(kind, rotation)
     else:
         layout = wire(wirings, info.features, kind, rotation)
-    encoded = described and info.features[ACTION]["info"][SPEC]["space"] != JointSpace.kind
-    decode = encoded and (kind == JointSpace.kind or joints_column(info.features, layout) is None)
+    encoded = described and info.features[ACTION]["info"][SPEC]["space"] != JOINT
+    decode = encoded and (kind == JOINT or joints_column(info.features, layout) is None)
     done, total = 0, info.total_frames
 
     def advance(frames: int) -> None:

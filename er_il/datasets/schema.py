@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from er_il.spaces import ActionSpace
+from er_il.spaces.base import ArmSpace
 from er_il.spaces.layout import Layout
 from er_il.spaces.spec import ACTION, SPEC
 
@@ -20,7 +20,7 @@ Feature = dict[str, Any]
 
 
 def features(
-    space: ActionSpace,
+    space: ArmSpace,
     state_names: tuple[str, ...],
     environment_state_names: tuple[str, ...],
     cameras: tuple[str, ...],

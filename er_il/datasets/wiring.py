@@ -10,9 +10,9 @@ import yaml
 from er_il.arms.arm import Arm, ArmAngleFrames
 from er_il.arms.presets import PRESETS
 from er_il.datasets.schema import STATE, Feature, dimension_names
-from er_il.spaces import make_action_space
 from er_il.spaces.layout import Layout, Part
 from er_il.spaces.motors import Motors
+from er_il.spaces.registry import make_arm_space
 from er_il.spaces.spec import ACTION
 from er_il.support.errors import ArmError, DatasetError, UnknownNameError
 
@@ -77,7 +77,7 @@ class Wiring:
                 raise UnknownNameError("dimension of the state", joint, state_names)
         state = self.state_joints or (joints if set(joints) <= set(state_names) else ())
         motors = Motors(joints, self.units, self.signs, self.offsets, state)
-        return Part(self.label, make_action_space(kind, arm, rotation=rotation), motors)
+        return Part(self.label, make_arm_space(kind, arm, rotation=rotation), motors)
 
 
 def wire(wirings: Sequence[Wiring], features: Mapping[str, Feature], kind: str, rotation: str) -> Layout:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from er_il.spaces import ActionSpace
+from er_il.spaces.base import ArmSpace
 from er_il.spaces.spec import action_spec
 from er_il.support.errors import DatasetError, PolicyError
 
@@ -42,12 +42,13 @@ class Contract:
         """Return the contract of an action space's specification."""
         arm = spec["arm"]
         # What a space commands beside the pose is the arm's redundant joints only if it names them.
-        commanded = [joint for joint in arm["redundant"] if f"{joint}.pos" in spec["names"]]
+        names = {name.rpartition(".")[0] for name in spec["names"]}  # joint.pos, or joint.delta
+        commanded = [joint for joint in arm["redundant"] if joint in names]
         redundant = "+".join(commanded) if "rotation" in spec and commanded else NONE
         return cls(spec["space"], arm["name"], arm["ee_frame"], spec.get("rotation", NONE), redundant)
 
     @classmethod
-    def of_space(cls, space: ActionSpace) -> "Contract":
+    def of_space(cls, space: ArmSpace) -> "Contract":
         """Return the contract that an action space fulfils."""
         return cls.of_spec(space.spec())
 
@@ -101,7 +102,7 @@ def policy_contract(policy: str | Path) -> Contract:
     return declared
 
 
-def check_policy(policy: str | Path, space: ActionSpace) -> None:
+def check_policy(policy: str | Path, space: ArmSpace) -> None:
     """Refuse a policy whose actions are not those of ``space``.
 
     Raises:
@@ -120,7 +121,7 @@ def check_policy(policy: str | Path, space: ActionSpace) -> None:
 
 
 def decodes(policy: str | Path) -> bool:
-    """Whether a policy in a folder decodes its actions by itself (see :mod:`er_il.robots.attachment`)."""
+    """True if a policy in a folder decodes its actions by itself (see :mod:`er_il.robots.attachment`)."""
     try:
         steps = json.loads((Path(policy) / "policy_postprocessor.json").read_text())["steps"]
         return any(step.get("registry_name") == DECODE_POLICY_ACTION for step in steps)

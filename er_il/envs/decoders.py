@@ -1,4 +1,4 @@
-"""The decoders that reports compare: an action space, and what IK does with the freedom it leaves.
+"""The decoders that reports compare: an action space, and a resolution of the freedom that it leaves to IK.
 
 Both decoders of task space read the same dataset and the same policy.
 """
@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from er_il.arms.arm import Arm
-from er_il.spaces import AT, SPACES, ActionSpace, check_space, make_action_space
+from er_il.spaces.base import ArmSpace
+from er_il.spaces.pose import TASK
+from er_il.spaces.registry import AT, SPACES, make_arm_space, split_name
 from er_il.support.errors import ShapeError, UnknownNameError
 
 NEAREST, POSTURE = "nearest", "posture"
@@ -17,7 +19,7 @@ RESOLUTIONS = (NEAREST, POSTURE)
 
 @dataclass(frozen=True)
 class Decoder:
-    """An action space by kind, and how IK resolves what the action leaves open.
+    """An action space by name, absolute or delta, and how IK resolves what the action leaves open.
 
     ``nearest`` takes the solution near the measured joints, ``posture`` the one near a posture: the
     arm's comfortable one, or the one given here. Only task space leaves anything open.
@@ -28,22 +30,22 @@ class Decoder:
     posture: tuple[float, ...] = ()  # (n,) [rad]; the arm's comfortable one if empty
 
     def __post_init__(self) -> None:
-        check_space(self.space)
+        split_name(self.space)  # raises if unknown
         if self.resolution not in RESOLUTIONS:
             raise UnknownNameError("resolution", self.resolution, RESOLUTIONS)
 
-    def action_space(self, arm: Arm, rotation: str = "quat") -> ActionSpace:
+    def space_of(self, arm: Arm, rotation: str = "quat") -> ArmSpace:
         """Build the action space that decodes for an arm."""
         chosen = np.array(self.posture) if self.posture else arm.home
         if chosen.shape != (arm.dof,):
             raise ShapeError("The posture", chosen.shape, f"({arm.dof},)")
         posture = chosen if self.resolution == POSTURE else None
-        return make_action_space(self.space, arm, rotation=rotation, posture=posture)
+        return make_arm_space(self.space, arm, rotation=rotation, posture=posture)
 
 
 def _decoders() -> dict[str, Decoder]:
-    table = {space: Decoder(space) for space in SPACES if space != "task"}
-    table |= {f"task-{resolution}": Decoder("task", resolution) for resolution in RESOLUTIONS}
+    table = {space: Decoder(space) for space in SPACES if space != TASK}
+    table |= {f"task-{resolution}": Decoder(TASK, resolution) for resolution in RESOLUTIONS}
     return table
 
 

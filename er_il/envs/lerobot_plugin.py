@@ -1,7 +1,7 @@
 """The environments as LeRobot knows them: ``--env.type=er_il --env.task=reach_cup --env.action_space=erj``."""
 
 from dataclasses import dataclass, field
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import gymnasium
@@ -11,11 +11,13 @@ from lerobot.envs import EnvConfig
 from lerobot.envs.utils import freeze_after_episode_end
 from lerobot.utils.constants import ACTION, OBS_ENV_STATE, OBS_IMAGES, OBS_STATE
 
-from er_il.control.commander import BEST_EFFORT
+from er_il.arms.arm import Arm
+from er_il.control.commander import BEST_EFFORT, check_answer
 from er_il.envs.contract import check_policy
 from er_il.envs.decoders import NEAREST, Decoder
 from er_il.envs.tasks import task_id
-from er_il.envs.wrapper import DecodingEnv, make_decoding_env
+from er_il.envs.wrapper import ActionSpaceEnv, make_action_space_env
+from er_il.spaces.base import ArmSpace
 
 
 @EnvConfig.register_subclass("er_il")
@@ -24,7 +26,8 @@ class ErIlEnvConfig(EnvConfig):
     """A simulated task whose actions are encoded in an action space.
 
     Attributes:
-        action_space: ``joint``, ``task``, ``erj``, ``era``, or ``erj@<joint>`` if ERJ commands another joint.
+        action_space: ``joint``, ``task``, ``erj``, ``era``, or ``erj@<joint>`` if ERJ commands another joint;
+            with ``delta_`` in front, changes of its commands.
         resolution: What IK does with the freedom that task space leaves: ``nearest`` or ``posture``.
         posture: Joint angles [rad] to which ``posture`` pulls; the arm's comfortable ones if empty.
         rotation: ``quat`` or ``rot6d``, as in the dataset that the policy was trained on.
@@ -46,10 +49,12 @@ class ErIlEnvConfig(EnvConfig):
     image_size: int = 96
 
     def __post_init__(self) -> None:
-        env = self.make()
-        self.fps = int(env.metadata["render_fps"])
-        self.features, self.features_map = _features(env)
-        env.close()
+        check_answer(self.on_invalid)
+        probe = _probe(self.gym_id, self.arm, tuple(self.cameras), self.image_size)
+        self.fps = probe.fps
+        action = PolicyFeature(FeatureType.ACTION, (self.space.dim + 1,))  # and the gripper's opening
+        self.features = {ACTION: action} | probe.features
+        self.features_map = {ACTION: ACTION} | probe.names
 
     @property
     def gym_id(self) -> str:
@@ -64,9 +69,14 @@ class ErIlEnvConfig(EnvConfig):
             "render_mode": "rgb_array",  # the stock commands film some episodes
         }
 
-    def make(self) -> DecodingEnv:
+    def make(self) -> ActionSpaceEnv:
         """Make one environment."""
         return _make(self.gym_id, self.gym_kwargs, self.decoder, self.rotation, self.on_invalid)
+
+    @property
+    def space(self) -> ArmSpace:
+        """The action space that decodes."""
+        return self.decoder.space_of(Arm.preset(self.arm), self.rotation)
 
     @property
     def decoder(self) -> Decoder:
@@ -77,9 +87,7 @@ class ErIlEnvConfig(EnvConfig):
         # LeRobot's own commands tell an environment nothing about the policy it will meet, but
         # the last chance to refuse a wrong one is here.
         if policy := parser.get_path_arg("policy"):
-            env = self.make()
-            check_policy(policy, env.space)
-            env.close()
+            check_policy(policy, self.space)
         make = partial(_make, self.gym_id, self.gym_kwargs, self.decoder, self.rotation, self.on_invalid)
         # An episode that has ended waits for the batch's slowest; without the freeze its successor's
         # first steps would count into its metrics.
@@ -93,18 +101,27 @@ class ErIlEnvConfig(EnvConfig):
         return {self.type: {0: vector}}
 
 
-def _make(gym_id: str, gym_kwargs: dict[str, Any], decoder: Decoder, rotation: str, on_invalid: str) -> DecodingEnv:
+def _make(gym_id: str, gym_kwargs: dict[str, Any], decoder: Decoder, rotation: str, on_invalid: str) -> ActionSpaceEnv:
     """Make an environment; at module level so that worker processes find it (and the tasks it needs)."""
-    return make_decoding_env(gym_id, decoder, rotation=rotation, on_invalid=on_invalid, **gym_kwargs)
+    return make_action_space_env(gym_id, decoder, rotation=rotation, on_invalid=on_invalid, **gym_kwargs)
 
 
-def _features(env: gymnasium.Env[Any, Any]) -> tuple[dict[str, PolicyFeature], dict[str, str]]:
-    """LeRobot's features and their names for policies, read off an environment's spaces."""
+@dataclass(frozen=True)
+class _Probe:
+    """What LeRobot has to know of an environment before it makes any."""
+
+    fps: int
+    features: dict[str, PolicyFeature]  # of the observations
+    names: dict[str, str]  # of these for policies
+
+
+@lru_cache
+def _probe(gym_id: str, arm: str, cameras: tuple[str, ...], image_size: int) -> _Probe:
+    """Read an environment's rate and observations off one instance, once a process."""
+    env = gymnasium.make(gym_id, arm=arm, cameras=cameras, image_size=image_size)
     observation = env.observation_space
     assert isinstance(observation, gymnasium.spaces.Dict)
-    assert env.action_space.shape is not None
-    features = {ACTION: PolicyFeature(FeatureType.ACTION, env.action_space.shape)}
-    names = {ACTION: ACTION}
+    features, names = {}, {}
     for key, kind, name in [
         ("agent_pos", FeatureType.STATE, OBS_STATE),
         ("environment_state", FeatureType.ENV, OBS_ENV_STATE),
@@ -116,4 +133,5 @@ def _features(env: gymnasium.Env[Any, Any]) -> tuple[dict[str, PolicyFeature], d
     for camera, space in pixels.items():
         features[f"pixels/{camera}"] = PolicyFeature(FeatureType.VISUAL, space.shape or ())
         names[f"pixels/{camera}"] = f"{OBS_IMAGES}.{camera}"
-    return features, names
+    env.close()
+    return _Probe(int(env.metadata["render_fps"]), features, names)

@@ -21,12 +21,14 @@ def task_names() -> tuple[str, ...]:
 
 
 def task_id(name: str) -> str:
-    """Gymnasium id of a task.
+    """Gymnasium id of a task, given its name or, of any registered environment, the id itself.
 
     Raises:
         UnknownNameError: no task has that name.
     """
     ids = _ids()
+    if name in gymnasium.registry:
+        return name
     if name not in ids:
         raise UnknownNameError("task", name, sorted(ids))
     return ids[name]

@@ -6,65 +6,74 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from er_il.control.commander import BEST_EFFORT, Commander
+from er_il.arms.arm import Vector
+from er_il.control.commander import BEST_EFFORT, Tally
+from er_il.control.vector_commander import VectorCommander
 from er_il.envs.decoders import Decoder
-from er_il.spaces import ActionSpace
+from er_il.envs.protocol import arm_env
+from er_il.envs.tasks import task_id
+from er_il.spaces.base import ArmSpace
+from er_il.spaces.layout import Layout
 
 INVALID_ACTION = "invalid_action"  # the failure of an episode that an invalid action stopped
 
 
-class DecodingEnv(
+class ActionSpaceEnv(
     gymnasium.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float32]], gymnasium.utils.RecordConstructorArgs
 ):
-    """Wraps a joint-level environment so that its action is an action space's.
+    """Wraps a joint-level environment so that its action is an action space's, and the gripper's opening.
 
-    ``info`` gains, at every step, ``command`` (n,) [rad] as sent to the arm, ``decode_status`` (a
-    :class:`er_il.Status` value) and ``joint_step`` [rad], the largest joint change asked for;
-    ``commander.tally`` sums the episode up.
+    The action's Box is that of the space: finite for deltas. ``info`` gains, at every step, ``command`` (n,) [rad]
+    as sent to the arm, ``decode_status`` (a :class:`er_il.Status` value) and ``joint_step`` [rad], the largest joint
+    change asked for; ``tally`` sums the episode up.
     """
 
-    def __init__(self, env: gymnasium.Env[Any, Any], space: ActionSpace, on_invalid: str = BEST_EFFORT) -> None:
+    def __init__(self, env: gymnasium.Env[Any, Any], space: ArmSpace, on_invalid: str = BEST_EFFORT) -> None:
         """Wrap ``env``, whose actions are the arm's n joint targets [rad] and the gripper's opening."""
         gymnasium.utils.RecordConstructorArgs.__init__(self, space=space, on_invalid=on_invalid, _disable_deepcopy=True)
         gymnasium.Wrapper.__init__(self, env)
+        self.world = arm_env(env)
         self.space = space
-        self.commander = Commander(space, 1.0 / env.metadata["render_fps"], on_invalid)
-        self.action_space = gymnasium.spaces.Box(-np.inf, np.inf, (space.dim,), np.float32)
+        layout = Layout.of_space(space)
+        self._commander = VectorCommander(layout, 1.0 / env.metadata["render_fps"], on_invalid)
+        low, high = (np.append(bound, opening) for bound, opening in zip(space.bounds, (0.0, 1.0), strict=True))
+        self.action_space = gymnasium.spaces.Box(low.astype(np.float32), high.astype(np.float32))
+
+    @property
+    def tally(self) -> Tally:
+        """Counts of the episode's decoded actions."""
+        return self._commander.arms[0].tally
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         observation, info = self.env.reset(seed=seed, options=options)
-        world: Any = self.unwrapped
-        self.commander.reset(world.joint_positions, world.gripper_opening)
+        self._commander.reset(self._measured())
         return observation, info
 
     def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        world: Any = self.unwrapped
-        command = self.commander.command(action, world.joint_positions)
-        target = np.append(command.q, command.gripper).astype(np.float32)
-        observation, reward, terminated, truncated, info = self.env.step(target)
-        info = info | {
-            "command": command.q,
-            "decode_status": str(command.status),
-            "joint_step": command.joint_step,
-        }
-        if command.stopped and not info["is_success"]:
+        commanded = self._commander.command(action, self._measured())
+        (arm,) = commanded.arms
+        observation, reward, terminated, truncated, info = self.env.step(commanded.vector.astype(np.float32))
+        info = info | {"command": arm.q, "decode_status": str(arm.status), "joint_step": arm.joint_step}
+        if arm.stopped and not info["is_success"]:
             terminated = True
             info["failure"] = INVALID_ACTION
         return observation, float(reward), terminated, truncated, info
 
+    def _measured(self) -> Vector:
+        return np.append(self.world.joint_positions, self.world.gripper_opening)
 
-def make_decoding_env(
-    task_id: str, decoder: Decoder, *, rotation: str = "quat", on_invalid: str = BEST_EFFORT, **kwargs: Any
-) -> DecodingEnv:
-    """Make a task's environment, by Gymnasium id, with a decoder's action space.
+
+def make_action_space_env(
+    task: str, decoder: Decoder, *, rotation: str = "quat", on_invalid: str = BEST_EFFORT, **kwargs: Any
+) -> ActionSpaceEnv:
+    """Make a task's environment with a decoder's action space.
 
     Args:
-        task_id: Gymnasium id of a joint-level environment.
+        task: Name of the task, or Gymnasium id of a joint-level environment.
         decoder: The action space and its resolution.
         rotation: ``quat`` or ``rot6d``.
         on_invalid: See :class:`er_il.control.commander.Commander`.
         kwargs: Passed on to ``gymnasium.make``.
     """
-    env = gymnasium.make(task_id, **kwargs)
-    world: Any = env.unwrapped
-    return DecodingEnv(env, decoder.action_space(world.arm, rotation), on_invalid)
+    env = gymnasium.make(task_id(task), **kwargs)
+    return ActionSpaceEnv(env, decoder.space_of(arm_env(env).arm, rotation), on_invalid)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from er_il.evaluation.rollouts import TIMEOUT
 from er_il.evaluation.trace import Trace
 from er_il.policy.actor import Actor, environment_of
+from er_il.spaces.action_space import ActionSpace
 
 SUCCESS = "success"
 Picture = NDArray[np.uint8]  # (H, W, 3)
@@ -61,7 +62,7 @@ def record_rollout(
             period=1 / env.metadata["render_fps"],
             label=decoder_name,
             outcome=SUCCESS if info["is_success"] else info["failure"] or TIMEOUT,
-            spec=env.space.spec(),
+            spec=ActionSpace(env.space).spec(),
             q=np.array(rows["q"]),
             gripper=np.array(rows["gripper"]),
             action=np.array(rows["action"], dtype=np.float64),

@@ -17,10 +17,10 @@ from er_il.datasets.recipe import Recipe
 from er_il.datasets.record import Record, Recorded, read_episodes, read_spec
 from er_il.envs.decoders import DECODERS, decoder
 from er_il.envs.tasks import task_id
-from er_il.envs.wrapper import DecodingEnv, make_decoding_env
+from er_il.envs.wrapper import ActionSpaceEnv, make_action_space_env
 from er_il.evaluation.outcomes import summarise
 from er_il.kinematics.rotation import Quaternion
-from er_il.spaces import from_spec, name_of
+from er_il.spaces.registry import arm_space_from_spec, name_of
 from er_il.support.atomic_files import write_json
 from er_il.support.errors import DatasetError
 from er_il.support.workers import worker_pool
@@ -93,7 +93,7 @@ def replay(datasets: Sequence[Path], workers: int, advance: Callable[[Path, str,
     return cells
 
 
-def replay_demo(world: DecodingEnv, demo: Recorded) -> Replayed:
+def replay_demo(world: ActionSpaceEnv, demo: Recorded) -> Replayed:
     """Execute a demo's actions in the world it was recorded in."""
     world.reset(seed=demo.seed)
     unwrapped: Any = world.unwrapped
@@ -148,16 +148,18 @@ class _Play:
     decoder: str
     rotation: str
 
-    def make(self) -> DecodingEnv:
+    def make(self) -> ActionSpaceEnv:
         environment = replace(self.recipe, cameras=()).environment
-        return make_decoding_env(
+        return make_action_space_env(
             task_id(self.recipe.task), decoder(self.decoder), rotation=self.rotation, **environment
         )
 
 
 def _plays(dataset: Path) -> list[_Play]:
     spec, recipe = read_spec(dataset), Record.read(dataset).recipe
-    name = name_of(from_spec(spec), Arm.preset(recipe.arm))  # refuses what this version would decode differently
+    name = name_of(
+        arm_space_from_spec(spec), Arm.preset(recipe.arm)
+    )  # refuses what this version would decode differently
     rotation = spec.get("rotation", Quaternion.kind)
     readers = [key for key, each in DECODERS.items() if each.space == name] or [name]
     return [_Play(recipe, reader, rotation) for reader in readers]
@@ -168,7 +170,7 @@ class _Worker:
     """The world a worker process has open: demos of one play come one after the other."""
 
     play: _Play | None = None
-    world: DecodingEnv | None = None
+    world: ActionSpaceEnv | None = None
 
     def replay(self, play: _Play, demo: Recorded) -> Replayed:
         if self.world is None or play != self.play:

@@ -150,7 +150,7 @@ def _rollout(vector: SyncVectorEnv, actor: Actor, seeds: list[int], elbow: Elbow
             success[i] = info["is_success"][i]
             failure[i] = "" if success[i] else info["failure"][i] or TIMEOUT
         done |= terminated | truncated
-    tallies = [commander.tally for commander in vector.get_attr("commander")]
+    tallies = vector.get_attr("tally")
     return [
         Episode(
             seed=seed,

@@ -22,7 +22,7 @@ from er_il.experiments.schedule import FileResult, Job
 from er_il.policy.actor import POLICY_ROWS
 from er_il.policy.configuration import default_config, default_steps
 from er_il.policy.training import PRECISION, Training, train_episodes
-from er_il.spaces import from_spec
+from er_il.spaces.action_space import from_spec
 from er_il.spaces.spec import action_spec
 from er_il.support.atomic_files import write_json
 from er_il.support.cost import Cost, measured

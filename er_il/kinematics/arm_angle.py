@@ -12,17 +12,20 @@ on the way in and out, so an arm should not work there.
 """
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from er_il.arms.arm import Arm, Vector
-from er_il.kinematics.forward import ForwardKinematics
-from er_il.support.errors import ArmError
+from er_il.kinematics.forward import ForwardKinematics, forward_of
+from er_il.kinematics.redundancy import Array, Linearisation, Redundancy
+from er_il.support.errors import ArmError, SpecError
 
-Array = NDArray[np.float64]
 VERTICAL = 1e-3  # [rad] closer than this to the vertical, the axis counts as vertical
+MARGIN = 0.2  # cosine of the distance from the turn opposite to the reference, within which turns are in doubt
 TINY = 1e-9  # [m] a circle smaller than this is a point
 UP = np.array([0.0, 0.0, 1.0])
 FORWARD = np.array([1.0, 0.0, 0.0])
@@ -83,38 +86,89 @@ class ElbowCircle:
         return tangent, (twist * self.side - self.foot * tangent) / self.reach
 
 
-class ArmAngle:
-    """The arm angle of one arm as a function of its joints."""
+@dataclass(frozen=True, eq=False)
+class ArmAngle(Redundancy):
+    """The arm angle of one arm as a function of its joints (ERA).
 
-    def __init__(self, kinematics: ForwardKinematics) -> None:
-        self._kinematics = kinematics
-        self._frames = _frames(kinematics.arm)
+    Along a trajectory the angle is unwrapped; the first takes the turn nearest to ``reference``.
+
+    Raises:
+        ArmError: the arm names no shoulder, elbow and wrist.
+    """
+
+    reference: float = 0.0  # [rad]
+
+    def __post_init__(self) -> None:
+        if self.arm.angle_frames is None:
+            raise ArmError(
+                f"{self.arm.name} names no shoulder, elbow and wrist links, which the arm angle needs: "
+                "give angle_frames."
+            )
+
+    @classmethod
+    def from_home(cls, arm: Arm) -> "ArmAngle":
+        """The arm angle counted from the turn of the arm's home posture."""
+        return cls(arm, float(cls(arm).wrapped(arm.home[None])[0]))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return ("arm_angle",)
+
+    @cached_property
+    def _forward(self) -> ForwardKinematics:
+        return forward_of(self.arm)
+
+    @cached_property
+    def _frames(self) -> tuple[str, str, str]:
+        frames = self.arm.angle_frames
+        assert frames is not None
+        return frames.shoulder, frames.elbow, frames.wrist
 
     def circle(self, q: Vector) -> ElbowCircle:
         """The elbow's circle at q (n,) [rad]."""
-        return ElbowCircle.through(*self._kinematics.points(q, self._frames)[0])
+        return ElbowCircle.through(*self._forward.points(q, self._frames)[0])
 
-    def along(self, q: Array) -> Vector:
+    def wrapped(self, q: Array) -> Vector:
         """Arm angles (N,) [rad] in (-pi, pi] at q (N, n) [rad]."""
-        points = [self._kinematics.fk_batch(q, frame)[:, :3, 3] for frame in self._frames]
+        points = [self._forward.fk_batch(q, frame)[:, :3, 3] for frame in self._frames]
         return np.array([ElbowCircle.through(*point).angle for point in zip(*points, strict=True)])
 
-    def slope(self, q: Vector) -> tuple[float, float, Vector]:
-        """The arm angle phi [rad] at q (n,) [rad], the radius r_E [m], and r_E dphi/dq (n,) [m/rad]."""
-        points, by_joints = self._kinematics.points(q, self._frames)
+    def along(self, q: Array) -> Array:
+        unwrapped = np.unwrap(np.concatenate([[self.reference], self.wrapped(q)]))[1:]
+        return np.asarray(unwrapped, dtype=np.float64)[:, None]
+
+    def linearise(self, q: Vector) -> Linearisation:
+        points, by_joints = self._forward.points(q, self._frames)
         circle = ElbowCircle.through(*points)
         by_elbow, by_wrist = circle.slopes()
         shoulder, elbow, wrist = by_joints
-        return circle.angle, circle.radius, by_elbow @ (elbow - shoulder) + by_wrist @ (wrist - shoulder)
+        derivative = by_elbow @ (elbow - shoulder) + by_wrist @ (wrist - shoulder)
+        return Linearisation(np.array([circle.angle]), circle.radius, derivative[None])
 
+    def difference(self, start: Vector, end: Vector) -> Vector:
+        return np.array([wrapped(turn) for turn in end - start])
 
-def _frames(arm: Arm) -> tuple[str, str, str]:
-    frames = arm.angle_frames
-    if frames is None:
-        raise ArmError(
-            f"{arm.name} names no shoulder, elbow and wrist links, which the arm angle needs: give angle_frames."
-        )
-    return frames.shoulder, frames.elbow, frames.wrist
+    def fitted(self, postures: Array) -> "ArmAngle":
+        """Another reference where the arm angles of postures lie about half a turn from this one."""
+        angles = self.wrapped(postures)
+        if np.cos(angles - self.reference).min() >= MARGIN - 1.0:
+            return self
+        mean = np.arctan2(np.sin(angles).mean(), np.cos(angles).mean())
+        return replace(self, reference=float(np.round(mean, 1)))
+
+    def details(self) -> dict[str, Any]:
+        assert self.arm.angle_frames is not None
+        return {"arm_angle": {**asdict(self.arm.angle_frames), "reference": self.reference}}
+
+    def restored(self, spec: Mapping[str, Any]) -> "ArmAngle":
+        described = spec["arm_angle"]
+        own = replace(self, reference=float(described["reference"]))
+        if own.details()["arm_angle"] != described:
+            raise SpecError(
+                f"The action spec measures the arm angle by {described}, but {self.arm.name!r} by "
+                f"{own.details()['arm_angle']}."
+            )
+        return own
 
 
 def wrapped(angle: float) -> float:

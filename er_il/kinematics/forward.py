@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
@@ -159,6 +159,12 @@ class ForwardKinematics:
         if angles.shape != (self.arm.dof,):
             raise ShapeError("Joint angles", angles.shape, f"({self.arm.dof},)")
         return angles
+
+
+@lru_cache
+def forward_of(arm: Arm) -> ForwardKinematics:
+    """The process's forward kinematics of an arm, built on first use."""
+    return ForwardKinematics(arm)
 
 
 def _rotation_angle(R: Array) -> float:

@@ -5,13 +5,12 @@ them short near a singularity, where undamped ones leap to another branch of sol
 as the goal is met, so that the last steps are quadratic. Undamped, they are Gauss and Newton's, each
 taken as it comes: what a solver does that follows the Jacobian's pseudo-inverse.
 
-Where a goal determines the joints (ERJ, ERA), solutions come in pairs that meet at a singularity,
+Where a goal determines the joints (a pose and a redundancy), solutions come in pairs that meet at a singularity,
 the fold. Near it the seed may lie closer to the one of the pair that the steps did not find.
 """
 
 import math
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -19,9 +18,9 @@ import placo  # pyright: ignore[reportMissingImports]
 from numpy.typing import NDArray
 
 from er_il.arms.arm import POSE_DOF, Vector
-from er_il.kinematics.arm_angle import ArmAngle, wrapped
 from er_il.kinematics.forward import ForwardKinematics
 from er_il.kinematics.qp import PoseQp
+from er_il.kinematics.redundancy import Array, Redundancy
 
 POSITION_TOLERANCE = 1e-4  # [m]
 ROTATION_TOLERANCE = 1e-3  # [rad]
@@ -42,13 +41,23 @@ FEW_ITERATIONS = 12
 FOLD_STEP = 1e-4  # [rad] of the finite difference across the fold
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Goal:
     """What a solution must meet."""
 
-    T_base_ee: NDArray[np.float64]  # (4, 4)
-    arm_angle: float | None  # [rad]
-    fixed: frozenset[str]  # joints that stay where the start has them
+    T_base_ee: Array  # (4, 4)
+    redundancy: Redundancy | None = None
+    values: Vector = field(default_factory=lambda: np.zeros(0))  # (m,) of the redundancy
+
+    @property
+    def held(self) -> tuple[int, ...]:
+        """Indices of the joints that stay where the start has them."""
+        return () if self.redundancy is None else self.redundancy.held
+
+    @property
+    def equations(self) -> int:
+        """Number of equations that the redundancy adds to the pose's; held joints are eliminated instead."""
+        return 0 if self.redundancy is None or self.held else len(self.redundancy.names)
 
 
 class Miss(NamedTuple):
@@ -56,9 +65,9 @@ class Miss(NamedTuple):
 
     position: float  # [m]
     rotation: float  # [rad]
-    size: float  # norm of what the QP corrects, the arm angle as a length along the elbow's circle
-    angle: float = 0.0  # [rad] of the arm angle
-    angle_row: tuple[Vector, float] | None = None  # slope (n,) [m/rad] along the circle, and the length to go [m]
+    size: float  # norm of what the QP corrects, the redundancy scaled to lengths
+    redundancy: float = 0.0  # [rad] of the worst redundancy value
+    equations: tuple[Array, Vector] | None = None  # scaled derivative (m, n) [m/rad], and the lengths to go (m,) [m]
 
 
 @dataclass(frozen=True)
@@ -67,13 +76,13 @@ class Attempt:
 
     q: Vector  # (n,) [rad]
     miss: Miss
-    moving: bool  # whether it was still getting closer
+    moving: bool  # it was still getting closer
 
     @property
     def reached(self) -> bool:
-        return (
-            self.miss.position <= POSITION_TOLERANCE and max(self.miss.rotation, self.miss.angle) <= ROTATION_TOLERANCE
-        )
+        """True if the goal is met within tolerance."""
+        angle = max(self.miss.rotation, self.miss.redundancy)
+        return self.miss.position <= POSITION_TOLERANCE and angle <= ROTATION_TOLERANCE
 
 
 class LocalSearch:
@@ -85,16 +94,7 @@ class LocalSearch:
         self._damped = damped
         self.iterations = 0  # of all runs so far
         self._robot = placo.RobotWrapper("", placo.Flags.ignore_collisions, self.arm.model_xml)
-        self._programs: dict[tuple[frozenset[str], bool, bool], PoseQp] = {}
-
-    @cached_property
-    def arm_angle(self) -> ArmAngle:
-        """The arm angle as a function of the joints.
-
-        Raises:
-            ArmError: the arm names no shoulder, elbow and wrist.
-        """
-        return ArmAngle(self._kinematics)
+        self._programs: dict[tuple[tuple[int, ...], bool, int], PoseQp] = {}
 
     def run(self, goal: Goal, q: Vector, posture: Vector | None = None, limit: int = MAX_ITERATIONS) -> Attempt:
         """Run QP steps from q until the goal is met well within tolerance, or nothing moves any more."""
@@ -105,7 +105,7 @@ class LocalSearch:
         while moving and iters < limit and (posture is not None or miss.size > POLISH):
             try:
                 damping = caution * DAMPING_GROWTH * miss.size**2 if self._damped else 0.0
-                moved = program.step(q, damping, miss.angle_row)
+                moved = program.step(q, damping, miss.equations)
             except RuntimeError:  # the QP has no solution: keep the last angles, the caller sees the miss
                 moving = False
                 break
@@ -122,13 +122,15 @@ class LocalSearch:
 
     def _miss(self, goal: Goal, q: Vector) -> Miss:
         pos_err, rot_err = self._kinematics.pose_error(goal.T_base_ee, q)
-        if goal.arm_angle is None:
+        if goal.redundancy is None or not goal.equations:
             return Miss(pos_err, rot_err, math.hypot(pos_err, rot_err))
-        angle, radius, slope = self.arm_angle.slope(q)
-        turn = wrapped(goal.arm_angle - angle)
-        return Miss(pos_err, rot_err, math.hypot(pos_err, rot_err, radius * turn), abs(turn), (slope, radius * turn))
+        at = goal.redundancy.linearise(q)
+        turn = goal.redundancy.difference(at.values, goal.values)
+        lengths = at.scale * turn
+        size = math.hypot(pos_err, rot_err, *lengths.tolist())
+        return Miss(pos_err, rot_err, size, float(np.abs(turn).max()), (at.derivative, lengths))
 
-    def beside(self, goal: Goal, seed: Vector, found: Attempt) -> Attempt | None:
+    def retry_nearby(self, goal: Goal, seed: Vector, found: Attempt) -> Attempt | None:
         """A better solution than ``found``, from beside the seed, if there is one.
 
         Starts lie along the direction in which the goal is least sensitive: where a goal close to
@@ -167,28 +169,30 @@ class LocalSearch:
         return twin if twin.reached and np.linalg.norm(twin.q - seed) < distance else None
 
     def held_by_limit(self, goal: Goal, attempt: Attempt) -> bool:
-        """Whether a joint would have to pass its limit to come closer to the goal."""
+        """True if a joint would have to pass its limit to come closer to the goal."""
         q, arm = attempt.q, self.arm
         push = self._kinematics.jacobian(q).T @ self._kinematics.pose_gap(goal.T_base_ee, q)
-        if attempt.miss.angle_row is not None:
-            gradient, change = attempt.miss.angle_row
-            push = push + gradient * change
+        if attempt.miss.equations is not None:
+            matrix, lengths = attempt.miss.equations
+            push = push + lengths @ matrix
         at_lower, at_upper = q - arm.lower < LIMIT_MARGIN, arm.upper - q < LIMIT_MARGIN
         return bool(np.any(((at_lower & (push < 0)) | (at_upper & (push > 0))) & self.free(goal)))
 
     def free(self, goal: Goal) -> NDArray[np.bool_]:
-        """Which joints (n,) the goal lets move."""
-        return np.array([joint not in goal.fixed for joint in self.arm.joints])
+        """Mask (n,) of the joints that the goal lets move."""
+        free = np.ones(self.arm.dof, dtype=bool)
+        free[list(goal.held)] = False
+        return free
 
     def _determined(self, goal: Goal) -> bool:
-        """Whether the goal has isolated solutions: as many conditions as free joints."""
-        return int(self.free(goal).sum()) == POSE_DOF + (goal.arm_angle is not None)
+        """True if the goal has isolated solutions: as many equations as free joints."""
+        return self.arm.dof - len(goal.held) == POSE_DOF + goal.equations
 
-    def derivative(self, goal: Goal, q: Vector) -> NDArray[np.float64]:
-        """Derivative of what the goal conditions by the free joints, square where it is determined."""
+    def derivative(self, goal: Goal, q: Vector) -> Array:
+        """Derivative of the goal's equations by the free joints, square where it is determined."""
         jacobian = self._kinematics.jacobian(q)
-        if goal.arm_angle is not None:
-            jacobian = np.vstack([jacobian, self.arm_angle.slope(q)[2]])
+        if goal.redundancy is not None and goal.equations:
+            jacobian = np.vstack([jacobian, goal.redundancy.linearise(q).derivative])
         return jacobian[:, self.free(goal)]
 
     def _embedded(self, goal: Goal, free: Vector) -> Vector:
@@ -198,9 +202,7 @@ class LocalSearch:
         return v
 
     def _program(self, goal: Goal, posture: bool) -> PoseQp:
-        key = (goal.fixed, posture, goal.arm_angle is not None)
+        key = (goal.held, posture, goal.equations)
         if key not in self._programs:
-            self._programs[key] = PoseQp(
-                self._robot, self.arm, goal.fixed, posture=posture, arm_angle=goal.arm_angle is not None
-            )
+            self._programs[key] = PoseQp(self._robot, self.arm, goal.held, posture=posture, equations=goal.equations)
         return self._programs[key]

@@ -1,6 +1,5 @@
 """Kinematics of an arm: Pinocchio's forward kinematics, and inverse kinematics by Placo's QP."""
 
-from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import lru_cache
@@ -9,10 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from er_il.arms.arm import Arm, Vector
-from er_il.kinematics.arm_angle import ArmAngle
 from er_il.kinematics.forward import ForwardKinematics
+from er_il.kinematics.redundancy import Redundancy
 from er_il.kinematics.search import LIMIT_MARGIN, Attempt, Goal, LocalSearch
-from er_il.support.errors import UnknownNameError
+from er_il.support.errors import ShapeError
 
 FAR = 0.3  # [rad] a solution this far from the seed is looked at with suspicion
 
@@ -30,13 +29,17 @@ class Status(StrEnum):
 
 @dataclass(frozen=True)
 class IkResult:
-    """Outcome of :meth:`Kinematics.solve`; ``q`` is the best effort whatever the status."""
+    """Joint angles found for an action, and how exactly they meet it.
+
+    ``q`` is finite and within the joint limits whatever the status: the best effort, or the seed where the action
+    means nothing.
+    """
 
     q: Vector  # (n,) [rad]
     status: Status
-    pos_err: float  # [m]
-    rot_err: float  # [rad]
-    iters: int  # of all attempts
+    pos_err: float = 0.0  # [m]
+    rot_err: float = 0.0  # [rad]
+    iters: int = 0  # of all attempts
 
 
 class Kinematics(ForwardKinematics):
@@ -46,22 +49,14 @@ class Kinematics(ForwardKinematics):
         super().__init__(arm)
         self._search = LocalSearch(self, damped)
 
-    @property
-    def arm_angle(self) -> ArmAngle:
-        """The arm angle as a function of the joints.
-
-        Raises:
-            ArmError: the arm names no shoulder, elbow and wrist.
-        """
-        return self._search.arm_angle
-
     def solve(
         self,
         T_base_ee: ArrayLike,
         seed: ArrayLike,
-        fixed: Mapping[str, float] | None = None,
+        redundancy: Redundancy | None = None,
+        values: ArrayLike = (),
+        *,
         posture: ArrayLike | None = None,
-        arm_angle: float | None = None,
     ) -> IkResult:
         """Find joint angles that reach a pose, starting from a seed.
 
@@ -72,22 +67,25 @@ class Kinematics(ForwardKinematics):
         Args:
             T_base_ee: (4, 4) target pose.
             seed: (n,) [rad] start of the iterations; clipped to the limits.
-            fixed: Joints that keep a given angle [rad] (ERJ's commanded joints). An angle outside
-                its limits is clipped and reported as ``Status.LIMIT``.
+            redundancy: What else is commanded.
+            values: (m,) [rad] its values. A joint's angle outside its limits is clipped and reported as
+                ``Status.LIMIT``; any turn of an arm angle is the same.
             posture: (n,) [rad] preferred configuration in the null space.
-            arm_angle: [rad] ERA's arm angle; any turn of it is the same.
+
+        Raises:
+            ShapeError: there are not as many values as the redundancy has names.
         """
         arm = self.arm
-        fixed = dict(fixed or {})
+        wanted = np.asarray(values, dtype=np.float64)
+        names = () if redundancy is None else redundancy.names
+        if wanted.shape != (len(names),):
+            raise ShapeError("The redundancy's values", wanted.shape, f"({len(names)},): {', '.join(names)}")
+        goal = Goal(np.asarray(T_base_ee, dtype=np.float64), redundancy, wanted)
         start = np.clip(self._checked(seed), arm.lower, arm.upper)
         clipped = False
-        for joint, angle in fixed.items():
-            if joint not in arm.joints:
-                raise UnknownNameError("joint", joint, arm.joints)
-            i = arm.joints.index(joint)
-            start[i] = np.clip(angle, arm.lower[i], arm.upper[i])
-            clipped |= abs(start[i] - angle) > LIMIT_MARGIN
-        goal = Goal(np.asarray(T_base_ee, dtype=np.float64), arm_angle, frozenset(fixed))
+        for joint, angle in zip(goal.held, wanted if goal.held else (), strict=True):
+            start[joint] = np.clip(angle, arm.lower[joint], arm.upper[joint])
+            clipped |= bool(abs(start[joint] - angle) > LIMIT_MARGIN)
         before = self._search.iterations
         if posture is not None:
             start = self._search.run(goal, start, self._checked(posture)).q
@@ -95,7 +93,7 @@ class Kinematics(ForwardKinematics):
         if posture is None:
             found = self._search.across_fold(goal, found, start) or found
             if not found.reached or np.abs(found.q - start).max() > FAR:
-                found = self._search.beside(goal, start, found) or found
+                found = self._search.retry_nearby(goal, start, found) or found
         if clipped:
             status = Status.LIMIT
         elif found.reached:
@@ -104,14 +102,14 @@ class Kinematics(ForwardKinematics):
             status = self._why_not(found, goal)
         return IkResult(found.q, status, found.miss.position, found.miss.rotation, self._search.iterations - before)
 
-    def conditioning(self, q: ArrayLike, fixed: Collection[str] = (), *, arm_angle: bool = False) -> float:
-        """How far a configuration is from a singularity of what is commanded.
+    def conditioning(self, q: ArrayLike, redundancy: Redundancy | None = None) -> float:
+        """Distance of a configuration q (n,) [rad] from a singularity of what is commanded.
 
-        The smallest singular value, in metres and radians mixed, of the end effector's Jacobian by
-        the joints that are not ``fixed`` (ERJ), with the elbow's way along its circle as a seventh
-        row if the arm angle is commanded (ERA). At 0 two solutions meet.
+        The smallest singular value, in metres and radians mixed, of the end effector's Jacobian by the joints that
+        the redundancy does not hold (ERJ), with the redundancy's scaled derivative below it otherwise (ERA: the
+        elbow's way along its circle). At 0 two solutions meet.
         """
-        goal = Goal(np.eye(4), 0.0 if arm_angle else None, frozenset(fixed))
+        goal = Goal(np.eye(4), redundancy)
         return float(np.linalg.svd(self._search.derivative(goal, self._checked(q)), compute_uv=False)[-1])
 
     def _why_not(self, attempt: Attempt, goal: Goal) -> Status:

@@ -46,9 +46,7 @@ def environment_of(
         cameras=[key.removeprefix(f"{OBS_IMAGES}.") for key in images],
         image_size=sizes.pop() if sizes else ErIlEnvConfig.image_size,
     )
-    env = config.make()
-    check_policy(policy, env.space)
-    env.close()
+    check_policy(policy, config.space)
     return config
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import yaml
 
 from er_il.datasets.schema import IMAGES
-from er_il.spaces import split_name
+from er_il.spaces.registry import split_name
 from er_il.support.errors import PolicyError
 from er_il.support.resources import data_dir
 

@@ -15,7 +15,7 @@ import yaml
 from er_il.datasets.recipe import TRAIN
 from er_il.envs.contract import Contract, dataset_info
 from er_il.policy.configuration import input_features, named_inputs
-from er_il.spaces import check_space, split_name
+from er_il.spaces.registry import check_space, split_name
 from er_il.spaces.spec import action_spec
 from er_il.support.atomic_files import write_whole
 from er_il.support.errors import DatasetError, PolicyError

@@ -18,8 +18,8 @@ from lerobot.processor import AbsoluteActionsProcessorStep, ProcessorStepRegistr
 
 from er_il.arms.arm import Vector
 from er_il.control.commander import BEST_EFFORT
-from er_il.control.vector_commander import RobotCommander
 from er_il.envs.contract import DECODE_POLICY_ACTION
+from er_il.robots.robot_commander import RobotCommander
 from er_il.spaces.layout import Layout
 from er_il.support.errors import ErIlError, ShapeError
 
@@ -62,7 +62,7 @@ def measured_names(layout: Layout) -> dict[str, str]:
 
     Arms say so themselves. Anything else is looked for under its own name.
     """
-    names = {name: name for name in layout.passed}
+    names = {name: name for name in layout.other_dimensions}
     for part in layout.parts:
         names |= dict(zip(part.motors.joints, part.motors.state or part.motors.joints, strict=True))
     return names

@@ -1,73 +1,57 @@
-"""What every action space is: an invertible pair of ``encode`` and ``decode`` with named dimensions."""
+"""The interface of every action space: an invertible pair of ``encode`` and ``decode`` with named dimensions."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from er_il.arms.arm import Arm, Vector
-from er_il.kinematics.solver import Kinematics, Status, kinematics_of
+from er_il.kinematics.solver import IkResult, Kinematics, Status, kinematics_of
 from er_il.spaces.spec import SPEC_VERSION
 from er_il.support.errors import ShapeError
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Decoded:
-    """A joint command and what became of the action it came from.
-
-    ``q`` is finite and within the joint limits whatever the status: the best effort, or the seed
-    where the action means nothing.
-    """
-
-    q: Vector  # (n,) [rad]
-    gripper: float  # in [0, 1], 1 open
-    status: Status
-    pos_err: float = 0.0  # [m]
-    rot_err: float = 0.0  # [rad]
-    iters: int = 0
-
-
 @dataclass(frozen=True, eq=False)
-class ActionSpace(ABC):
-    """An action space of one arm and its gripper.
-
-    The last dimension of an action is the gripper's opening in [0, 1].
-    """
+class ArmSpace(ABC):
+    """An action space of one arm, without its gripper."""
 
     arm: Arm
 
-    kind: ClassVar[str]
+    @property
+    @abstractmethod
+    def kind(self) -> str:
+        """Name of the space in a specification, such as ``erj``."""
 
     @property
     @abstractmethod
-    def arm_names(self) -> tuple[str, ...]:
-        """Names of the dimensions that command the arm."""
+    def names(self) -> tuple[str, ...]:
+        """Name of each dimension of an action."""
 
     @abstractmethod
-    def _encode_arm(self, q: Array) -> Array:
-        """Encode a trajectory q (N, n) [rad] as (N, dim - 1)."""
+    def _encode(self, q: Array) -> Array:
+        """Encode a trajectory q (N, n) [rad] as (N, dim)."""
 
     @abstractmethod
-    def _decode_arm(self, action: Vector, seed: Vector, current: Vector) -> Decoded:
-        """Decode a finite action (dim - 1,); the gripper is filled in by the caller."""
+    def _decode(self, action: Vector, seed: Vector, current: Vector) -> IkResult:
+        """Decode a finite action (dim,) from a seed and a last command within the joint limits."""
 
     @abstractmethod
     def _details(self) -> dict[str, Any]:
         """What the specification holds beyond the kind, the arm and the names."""
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Name of each dimension of an action."""
-        return (*self.arm_names, "gripper")
-
-    @property
     def dim(self) -> int:
         """Length of an action."""
         return len(self.names)
+
+    @property
+    def bounds(self) -> tuple[Vector, Vector]:
+        """Lowest and highest value (dim,) of each dimension; infinite where the space declares none."""
+        return np.full(self.dim, -np.inf), np.full(self.dim, np.inf)
 
     @property
     def kinematics(self) -> Kinematics:
@@ -78,50 +62,64 @@ class ActionSpace(ABC):
         """End-effector pose ``T_base_ee`` (4, 4) at q (n,) [rad]."""
         return self.kinematics.fk(q)
 
-    def encode(self, q: ArrayLike, gripper: ArrayLike = 1.0) -> Array:
+    def conditioning(self, q: ArrayLike) -> float:
+        """Distance of q (n,) [rad] from a singularity of the space; infinite where decoding solves nothing."""
+        return np.inf
+
+    def encode(self, q: ArrayLike, start: ArrayLike | None = None) -> Array:
         """Encode joint angles as actions.
 
         Args:
             q: (n,) [rad], or a trajectory (N, n) in time order: rotations are kept continuous along it.
-            gripper: Opening in [0, 1], one value or (N,).
+            start: (n,) [rad] command before the first, which a delta counts from; the first itself if omitted.
 
         Returns:
             (dim,) or (N, dim).
+
+        Raises:
+            BoundsError: a delta is larger than its bounds, so that its decoding would not lead there.
         """
         angles = np.asarray(q, dtype=np.float64)
         if angles.ndim not in (1, 2) or angles.shape[-1] != self.arm.dof:
             raise ShapeError("Joint angles", angles.shape, f"({self.arm.dof},) or (N, {self.arm.dof})")
         batch = np.atleast_2d(angles)
-        opening = np.broadcast_to(np.asarray(gripper, dtype=np.float64), len(batch))
-        action = np.column_stack([self._encode_arm(batch), opening])
+        if start is not None:
+            if np.shape(start) != (self.arm.dof,):
+                raise ShapeError("The start", np.shape(start), f"({self.arm.dof},)")
+            batch = np.vstack([start, batch])
+        action = self._encode(batch)[0 if start is None else 1 :]
         return action[0] if angles.ndim == 1 else action
 
-    def decode(self, action: ArrayLike, seed: ArrayLike, current: ArrayLike | None = None) -> Decoded:
+    def decode(self, action: ArrayLike, seed: ArrayLike, current: ArrayLike | None = None) -> IkResult:
         """Decode an action to joint angles near a seed.
 
         Args:
-            action: (dim,) as a policy gives it; rotations are normalised, the gripper is clipped.
+            action: (dim,) as a policy gives it; rotations are normalised.
             seed: (n,) [rad] the arm's measured angles, where IK starts.
             current: (n,) [rad] the last command, which a delta counts from; the seed if omitted.
                 Absolute spaces do not need it.
         """
         command = np.asarray(action, dtype=np.float64)
-        start = np.asarray(seed, dtype=np.float64)
         if command.shape != (self.dim,):
             raise ShapeError(f"A {self.kind} action", command.shape, f"({self.dim},): {', '.join(self.names)}")
-        last = start if current is None else np.asarray(current, dtype=np.float64)
-        for what, angles in (("The seed", start), ("The current command", last)):
-            if angles.shape != (self.arm.dof,):
-                raise ShapeError(what, angles.shape, f"({self.arm.dof},)")
-        start = np.clip(start, self.arm.lower, self.arm.upper)
-        opening = float(np.clip(command[-1], 0.0, 1.0)) if np.isfinite(command[-1]) else 1.0
+        start, last = self._within_limits("The seed", seed), seed if current is None else current
         if not np.all(np.isfinite(command)):
-            return Decoded(start, opening, Status.INVALID)
-        decoded = self._decode_arm(command[:-1], start, np.clip(last, self.arm.lower, self.arm.upper))
-        return Decoded(decoded.q, opening, decoded.status, decoded.pos_err, decoded.rot_err, decoded.iters)
+            return IkResult(start, Status.INVALID)
+        return self._decode(command, start, self._within_limits("The current command", last))
+
+    def ease(self, action: ArrayLike, seed: Vector, within: Vector, current: Vector) -> Vector | None:
+        """Joint angles (n,) [rad] near a seed that do as much of an action as lies on the way; None if there are none.
+
+        Args:
+            action: (dim,) that decodes to joints far from the seed.
+            seed: (n,) [rad] the arm's measured angles.
+            within: (n,) [rad] how far each joint may be from the seed.
+            current: (n,) [rad] the last command, which a delta counts from.
+        """
+        return None
 
     def spec(self) -> dict[str, Any]:
-        """Describe the space as JSON, to travel with datasets (see :func:`er_il.spaces.from_spec`)."""
+        """Describe the space as JSON; :func:`er_il.spaces.registry.arm_space_from_spec` rebuilds it."""
         arm = self.arm
         return {
             "version": SPEC_VERSION,
@@ -138,3 +136,9 @@ class ActionSpace(ABC):
             "names": list(self.names),
             **self._details(),
         }
+
+    def _within_limits(self, what: str, angles: ArrayLike) -> Vector:
+        given = np.asarray(angles, dtype=np.float64)
+        if given.shape != (self.arm.dof,):
+            raise ShapeError(what, given.shape, f"({self.arm.dof},)")
+        return np.clip(given, self.arm.lower, self.arm.upper)

@@ -9,7 +9,7 @@ has no twin and no wrap, and its bound is a box.
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,10 +17,10 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from er_il.arms.arm import Vector
-from er_il.kinematics.solver import Status
-from er_il.spaces.base import ActionSpace, Array, Decoded
+from er_il.kinematics.solver import IkResult, Status
+from er_il.spaces.base import ArmSpace, Array
 from er_il.spaces.pose import PoseSpace
-from er_il.support.errors import BoundsError, ShapeError
+from er_il.support.errors import BoundsError
 
 PREFIX = "delta_"  # of the space's name in a spec
 POSE_NAMES = ("ee.dx", "ee.dy", "ee.dz", "ee.drx", "ee.dry", "ee.drz")
@@ -37,57 +37,52 @@ class DeltaBounds:
 
 
 @dataclass(frozen=True, eq=False)
-class DeltaSpace(ActionSpace):
+class DeltaSpace(ArmSpace):
     """Changes of an absolute space's commands."""
 
-    absolute: ActionSpace
-    bounds: DeltaBounds
-
-    kind = "delta"
+    absolute: ArmSpace
+    delta_bounds: DeltaBounds
 
     @property
-    def arm_names(self) -> tuple[str, ...]:
+    def kind(self) -> str:
+        return PREFIX + self.absolute.kind
+
+    @property
+    def names(self) -> tuple[str, ...]:
         if isinstance(self.absolute, PoseSpace):
             return (*POSE_NAMES, *_changes(self.absolute.redundancy_names))
-        return _changes(self.absolute.arm_names)
+        return _changes(self.absolute.names)
 
     @property
     def limits(self) -> Vector:
-        """Largest magnitude (dim - 1,) of each dimension that commands the arm [m or rad]."""
-        bounds = self.bounds
+        """Largest magnitude (dim,) of each dimension [m or rad]."""
+        bounds = self.delta_bounds
         if not isinstance(self.absolute, PoseSpace):
-            return np.full(self.dim - 1, bounds.angle)
-        return np.array([bounds.position] * 3 + [bounds.rotation] * 3 + [bounds.angle] * (self.dim - 7))
+            return np.full(self.dim, bounds.angle)
+        redundancy = [bounds.angle] * len(self.absolute.redundancy_names)
+        return np.array([bounds.position] * 3 + [bounds.rotation] * 3 + redundancy)
 
-    def encode(self, q: ArrayLike, gripper: ArrayLike = 1.0, start: ArrayLike | None = None) -> Array:
-        """Encode commanded joint angles as changes.
+    @property
+    def bounds(self) -> tuple[Vector, Vector]:
+        return -self.limits, self.limits
 
-        Args:
-            q: (n,) [rad], or a trajectory (N, n) of consecutive commands.
-            gripper: Opening in [0, 1], one value or (N,).
-            start: (n,) [rad] command before the first; the first itself if omitted, so that its
-                change is zero.
+    def conditioning(self, q: ArrayLike) -> float:
+        return self.absolute.conditioning(q)
 
-        Raises:
-            BoundsError: a change is larger than the bounds, so that its decoding would not lead there.
-        """
-        if start is None:
-            return super().encode(q, gripper)
-        angles = np.asarray(q, dtype=np.float64)
-        if np.shape(start) != (self.arm.dof,):
-            raise ShapeError("The start", np.shape(start), f"({self.arm.dof},)")
-        opening = np.broadcast_to(np.asarray(gripper, dtype=np.float64), len(np.atleast_2d(angles)))
-        action = super().encode(np.vstack([start, angles]), np.concatenate([opening[:1], opening]))[1:]
-        return action[0] if angles.ndim == 1 else action
+    def ease(self, action: ArrayLike, seed: Vector, within: Vector, current: Vector) -> Vector | None:
+        if not isinstance(self.absolute, PoseSpace):
+            return None
+        change = np.clip(np.asarray(action, dtype=np.float64), *self.bounds)
+        return self.absolute.ease_pose(*self._target(self.absolute, change, current), seed, within)
 
-    def _encode_arm(self, q: Array) -> Array:
+    def _encode(self, q: Array) -> Array:
         space = self.absolute
         if isinstance(space, PoseSpace):
-            T_base_ee = self.kinematics.fk_batch(q)
+            T_base_ee = space.kinematics.fk_batch(q)
             R = Rotation.from_matrix(T_base_ee[:, :3, :3])
             turns = (R[1:] * R[:-1].inv()).as_rotvec()
             changes = np.column_stack(
-                [np.diff(T_base_ee[:, :3, 3], axis=0), turns, np.diff(space.redundancy(q), axis=0)]
+                [np.diff(T_base_ee[:, :3, 3], axis=0), turns, np.diff(space.redundancy_along(q), axis=0)]
             )
         else:
             changes = np.diff(q, axis=0)
@@ -98,33 +93,27 @@ class DeltaSpace(ActionSpace):
                 f"Step {step + 1} changes {self.names[dimension]} by {changes[step, dimension]:.3g}; "
                 f"the declared bound is {self.limits[dimension]:.3g}."
             )
-        return np.vstack([np.zeros(self.dim - 1), changes])
+        return np.vstack([np.zeros(self.dim), changes])
 
-    def _decode_arm(self, action: Vector, seed: Vector, current: Vector) -> Decoded:
-        change = np.clip(action, -self.limits, self.limits)
+    def _decode(self, action: Vector, seed: Vector, current: Vector) -> IkResult:
+        change = np.clip(action, *self.bounds)
         clipped = bool(np.any(np.abs(action) > self.limits * (1.0 + TOLERANCE)))
         space = self.absolute
         if isinstance(space, PoseSpace):
-            T_base_ee = self.kinematics.fk(current)
-            T_base_ee[:3, 3] += change[:3]
-            T_base_ee[:3, :3] = Rotation.from_rotvec(change[3:6]).as_matrix() @ T_base_ee[:3, :3]
-            decoded = space.decode_pose(T_base_ee, space.redundancy(current[None])[0] + change[6:], seed)
+            decoded = space.solve(*self._target(space, change, current), seed)
         else:
-            decoded = space.decode(np.append(current + change, 0.0), seed)
-        if clipped and decoded.status is Status.OK:
-            return Decoded(decoded.q, 0.0, Status.LIMIT, decoded.pos_err, decoded.rot_err, decoded.iters)
-        return decoded
+            decoded = space.decode(current + change, seed)
+        return replace(decoded, status=Status.LIMIT) if clipped and decoded.status is Status.OK else decoded
 
-    def spec(self) -> dict[str, Any]:
-        return {**super().spec(), "space": PREFIX + self.absolute.kind}
+    def _target(self, space: PoseSpace, change: Vector, current: Vector) -> tuple[Array, Vector]:
+        """The pose (4, 4) and the redundancy values to which a change leads from the last command."""
+        T_base_ee = space.kinematics.fk(current)
+        T_base_ee[:3, 3] += change[:3]
+        T_base_ee[:3, :3] = Rotation.from_rotvec(change[3:6]).as_matrix() @ T_base_ee[:3, :3]
+        return T_base_ee, space.redundancy_along(current[None])[0] + change[6:]
 
     def _details(self) -> dict[str, Any]:
-        return {**self.absolute._details(), "bounds": asdict(self.bounds)}
-
-
-def make_delta_space(absolute: ActionSpace, bounds: DeltaBounds | None = None) -> DeltaSpace:
-    """Wrap an absolute space, so that actions are changes within ``bounds``."""
-    return DeltaSpace(absolute.arm, absolute, bounds or DeltaBounds())
+        return {**self.absolute._details(), "bounds": asdict(self.delta_bounds)}
 
 
 def _changes(names: Sequence[str]) -> tuple[str, ...]:

@@ -6,27 +6,32 @@ from typing import Any
 import numpy as np
 
 from er_il.arms.arm import Vector
-from er_il.kinematics.solver import LIMIT_MARGIN, Status
-from er_il.spaces.base import ActionSpace, Array, Decoded
+from er_il.kinematics.search import LIMIT_MARGIN
+from er_il.kinematics.solver import IkResult, Status
+from er_il.spaces.base import ArmSpace, Array
+
+JOINT = "joint"
 
 
 @dataclass(frozen=True, eq=False)
-class JointSpace(ActionSpace):
-    """The n joint angles [rad] and the gripper."""
-
-    kind = "joint"
+class JointSpace(ArmSpace):
+    """The n joint angles [rad]."""
 
     @property
-    def arm_names(self) -> tuple[str, ...]:
+    def kind(self) -> str:
+        return JOINT
+
+    @property
+    def names(self) -> tuple[str, ...]:
         return tuple(f"{joint}.pos" for joint in self.arm.joints)
 
-    def _encode_arm(self, q: Array) -> Array:
+    def _encode(self, q: Array) -> Array:
         return q
 
-    def _decode_arm(self, action: Vector, seed: Vector, current: Vector) -> Decoded:
+    def _decode(self, action: Vector, seed: Vector, current: Vector) -> IkResult:
         q = np.clip(action, self.arm.lower, self.arm.upper)
         inside = np.all(np.abs(q - action) <= LIMIT_MARGIN)
-        return Decoded(q, 0.0, Status.OK if inside else Status.LIMIT)
+        return IkResult(q, Status.OK if inside else Status.LIMIT)
 
     def _details(self) -> dict[str, Any]:
         return {}

@@ -1,4 +1,4 @@
-"""Which joints should ERJ command? What each choice leaves to IK, by kinematics alone.
+"""The choice of the joints that ERJ commands: what each leaves to IK, by kinematics alone.
 
 With the joints S commanded, IK has the others' square Jacobian J_-S. Its determinant is
 
@@ -6,7 +6,8 @@ With the joints S commanded, IK has the others' square Jacobian J_-S. Its determ
 
 where the columns of N are an orthonormal basis of the arm's self-motion, the joint velocities that
 leave the end effector still. So a choice is as good as self-motion turns its joints: where it does
-not, det N_S = 0, two solutions meet (a fold), and past it the same action means the other one.
+not, det N_S = 0, two solutions meet (a fold), and past it the same action means the other one. For another redundancy
+with the derivative D the same holds of det(D N).
 
 Lengths weigh by ``LENGTH`` against angles in singular values; det N_S does without.
 """
@@ -20,9 +21,10 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from er_il.arms.arm import Arm, Vector
+from er_il.kinematics.redundancy import JointAngle, Redundancy
 from er_il.kinematics.solver import Status, kinematics_of
-from er_il.spaces import make_action_space
 from er_il.spaces.pose import PoseSpace
+from er_il.spaces.registry import ERJ, make_arm_space
 from er_il.spaces.round_trip import SINGULAR, round_trip
 from er_il.support.errors import ArmError
 
@@ -80,21 +82,28 @@ def choices(arm: Arm) -> list[Choice]:
 
 def sensitivities(arm: Arm, q: Array) -> dict[Choice, Sensitivity]:
     """What every choice leaves to IK at configurations q (N, n) [rad]."""
+    jacobians = weighted_jacobians(arm, q)
+    return {choice: sensitivity(JointAngle(arm, choice), jacobians, q) for choice in choices(arm)}
+
+
+def weighted_jacobians(arm: Arm, q: Array) -> Array:
+    """End-effector Jacobians (N, 6, n) at q (N, n) [rad], lengths weighed by ``LENGTH`` against angles."""
     kinematics = kinematics_of(arm)
     jacobians = np.array([kinematics.jacobian(each) for each in q])
     jacobians[:, :3] /= LENGTH
-    basis = np.linalg.svd(jacobians)[2][:, -arm.redundancy :]  # (N, n-6, n) self-motion
-    found = {}
-    for choice in choices(arm):
-        commanded = [arm.joints.index(joint) for joint in choice]
-        left = np.delete(jacobians, commanded, axis=2)
-        values = np.asarray(np.linalg.svd(left, compute_uv=False), dtype=np.float64)
-        smallest = values[:, -1]
-        share = np.abs(np.linalg.det(basis[:, :, commanded]))
-        found[choice] = Sensitivity(
-            smallest, values[:, 0] / np.maximum(smallest, 1e-12), np.sign(np.linalg.det(left)) * share
-        )
-    return found
+    return jacobians
+
+
+def sensitivity(redundancy: Redundancy, jacobians: Array, q: Array) -> Sensitivity:
+    """What a redundancy leaves to IK at configurations q (N, n) [rad] with weighted Jacobians (N, 6, n)."""
+    derivative = np.array([redundancy.linearise(each).derivative for each in q])  # (N, m, n)
+    left = jacobians if redundancy.held else np.concatenate([jacobians, derivative], axis=1)
+    left = np.delete(left, list(redundancy.held), axis=2)
+    values = np.asarray(np.linalg.svd(left, compute_uv=False), dtype=np.float64)
+    basis = np.linalg.svd(jacobians)[2][:, -derivative.shape[1] :]  # (N, m, n) self-motion
+    share = np.abs(np.linalg.det(basis @ derivative.transpose(0, 2, 1)))
+    smallest = values[:, -1]
+    return Sensitivity(smallest, values[:, 0] / np.maximum(smallest, 1e-12), np.sign(np.linalg.det(left)) * share)
 
 
 def stretches(smallest: Vector) -> list[tuple[int, int, float]]:
@@ -148,11 +157,11 @@ def along_demos(arm: Arm, choice: Choice, demos: Sequence[Array], sensitivity: S
 
 def play_back(space: PoseSpace, demo: Array, rng: np.random.Generator) -> Vector:
     """How far (T,) [rad] the worst joint is from a demo's (T, n), whose actions are decoded in turn, with errors."""
-    q, values, distances = demo[0], space.redundancy(demo), []
+    q, values, distances = demo[0], space.redundancy_along(demo), []
     for T_base_ee, value, meant in zip(space.kinematics.fk_batch(demo), values, demo, strict=True):
         T_base_ee[:3, 3] += rng.normal(scale=POSITION_ERROR, size=3)
         T_base_ee[:3, :3] = Rotation.from_rotvec(rng.normal(scale=ANGLE_ERROR, size=3)).as_matrix() @ T_base_ee[:3, :3]
-        q = space.decode_pose(T_base_ee, value + rng.normal(scale=ANGLE_ERROR, size=len(value)), q).q
+        q = space.solve(T_base_ee, value + rng.normal(scale=ANGLE_ERROR, size=len(value)), q).q
         distances.append(float(np.abs(q - meant).max()))
     return np.array(distances)
 
@@ -168,7 +177,7 @@ def ranked(fitness: Sequence[Mapping[Choice, Fitness]]) -> list[Choice]:
 
 
 def _space(arm: Arm, choice: Choice) -> PoseSpace:
-    space = make_action_space("erj", arm.commanding(choice))
+    space = make_arm_space(ERJ, arm.commanding(choice))
     assert isinstance(space, PoseSpace)
     return space
 

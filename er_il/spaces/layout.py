@@ -4,7 +4,7 @@ One vector may hold several arms, their joints in any order, and anything else (
 base). Encoded, it holds each arm's commands, one arm after the other, then everything else as it was.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -13,27 +13,31 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from er_il.arms.portable import arm_from_spec, arm_spec
-from er_il.spaces import ActionSpace, Decoded, JointSpace, from_spec, make_action_space
+from er_il.kinematics.solver import IkResult
+from er_il.spaces.base import ArmSpace
+from er_il.spaces.joint import JOINT, JointSpace
 from er_il.spaces.motors import Motors
 from er_il.spaces.references import fitted
+from er_il.spaces.registry import arm_space_from_spec, make_arm_space
 from er_il.spaces.spec import SPEC_VERSION
 from er_il.support.errors import DatasetError, ShapeError, SpecError
 
 Array = NDArray[np.float64]
+GRIPPER = "gripper"  # name of the opening in what er_il records
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
     """One arm of a robot."""
 
-    label: str  # "" where there is but one
-    space: ActionSpace
+    label: str  # "" if there is only one
+    space: ArmSpace
     motors: Motors
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the dimensions of the encoded vector that command the arm."""
-        return tuple(f"{self.label}_{name}" if self.label else name for name in self.space.arm_names)
+        return tuple(f"{self.label}_{name}" if self.label else name for name in self.space.names)
 
 
 @dataclass(frozen=True)
@@ -41,7 +45,7 @@ class LayoutDecoded:
     """A joint vector, and what became of each arm's command."""
 
     vector: Array  # (D,) the robot's values
-    parts: tuple[Decoded, ...]
+    parts: tuple[IkResult, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,19 +79,19 @@ class Layout:
             raise DatasetError(f"Encoded, two dimensions would have one name: {', '.join(self.encoded_names)}.")
 
     @classmethod
-    def of_space(cls, space: ActionSpace) -> "Layout":
+    def of_space(cls, space: ArmSpace) -> "Layout":
         """One arm, its joints [rad] in order, then the gripper: what er_il records."""
-        names = JointSpace(space.arm).names
-        return cls(names, (Part("", space, Motors(names[:-1], state=names[:-1])),))
+        joints = JointSpace(space.arm).names
+        return cls((*joints, GRIPPER), (Part("", space, Motors(joints, state=joints)),))
 
     @property
     def kind(self) -> str:
         """Kind of action space, the same for all arms."""
-        return self.parts[0].space.spec()["space"]
+        return self.parts[0].space.kind
 
     @cached_property
-    def passed(self) -> tuple[str, ...]:
-        """Names of the dimensions that belong to no arm."""
+    def other_dimensions(self) -> tuple[str, ...]:
+        """Names of the dimensions that belong to no arm, such as grippers; encoding leaves them as they are."""
         used = {joint for part in self.parts for joint in part.motors.joints}
         return tuple(name for name in self.names if name not in used)
 
@@ -96,11 +100,11 @@ class Layout:
         """Names of the dimensions of the encoded vector."""
         if self._joints:
             return self.names
-        return (*(name for part in self.parts for name in part.names), *self.passed)
+        return (*(name for part in self.parts for name in part.names), *self.other_dimensions)
 
     @cached_property
     def _joints(self) -> bool:
-        return self.kind == JointSpace.kind
+        return self.kind == JOINT
 
     def indices(self, part: Part) -> list[int]:
         """Positions of an arm's joints in the joint vector."""
@@ -115,9 +119,33 @@ class Layout:
         return part.motors.angles(np.asarray(vectors)[..., self.indices(part)])
 
     def in_space(self, kind: str, rotation: str) -> "Layout":
-        """The same layout in another action space (see :func:`er_il.spaces.make_action_space`)."""
-        parts = (replace(part, space=make_action_space(kind, part.space.arm, rotation=rotation)) for part in self.parts)
+        """The same layout in another action space (see :func:`er_il.spaces.registry.make_arm_space`)."""
+        parts = (replace(part, space=make_arm_space(kind, part.space.arm, rotation=rotation)) for part in self.parts)
         return replace(self, parts=tuple(parts))
+
+    def split(self, vector: Array) -> tuple[list[Array], Array]:
+        """Split joint vectors (..., D) into each arm's angles (..., n) [rad] and the other dimensions (..., k)."""
+        return [self.angles(part, vector) for part in self.parts], vector[..., self._others]
+
+    def join(self, angles: Sequence[Array], others: Array) -> Array:
+        """The joint vectors (..., D) that :meth:`split` takes apart."""
+        vector = np.empty((*others.shape[:-1], len(self.names)))
+        vector[..., self._others] = others
+        for part, q in zip(self.parts, angles, strict=True):
+            vector[..., self.indices(part)] = part.motors.values(q)
+        return vector
+
+    def split_encoded(self, encoded: Array) -> tuple[list[Array], Array]:
+        """Split encoded vectors (..., E) into each arm's action (..., dim) and the other dimensions (..., k)."""
+        if self._joints:
+            return self.split(encoded)
+        ends = np.cumsum([len(part.names) for part in self.parts])
+        *actions, others = np.split(encoded, ends, axis=-1)
+        return actions, others
+
+    def join_encoded(self, actions: Sequence[Array], others: Array) -> Array:
+        """The encoded vectors (..., E) that :meth:`split_encoded` takes apart."""
+        return self.join(actions, others) if self._joints else np.concatenate([*actions, others], axis=-1)
 
     def encode(self, vectors: ArrayLike) -> Array:
         """Encode joint vectors (T, D) of one episode in time order, as (T, len(encoded_names))."""
@@ -126,8 +154,8 @@ class Layout:
             raise ShapeError("Joint vectors", batch.shape, f"(T, {len(self.names)})")
         if self._joints:
             return batch
-        commands = [part.space.encode(self.angles(part, batch))[:, :-1] for part in self.parts]
-        return np.column_stack([*commands, batch[:, self._passed_indices]])
+        angles, others = self.split(batch)
+        return self.join_encoded([part.space.encode(q) for part, q in zip(self.parts, angles, strict=True)], others)
 
     def decode(self, action: ArrayLike, seed: ArrayLike, current: ArrayLike | None = None) -> LayoutDecoded:
         """Decode one encoded vector to a joint vector near a seed.
@@ -141,22 +169,14 @@ class Layout:
         if command.shape != (len(self.encoded_names),):
             raise ShapeError("An encoded vector", command.shape, f"({len(self.encoded_names)},)")
         last = start if current is None else np.asarray(current, dtype=np.float64)
-        vector, decoded, at = np.empty(len(self.names)), [], 0
-        vector[self._passed_indices] = command[
-            self._passed_indices if self._joints else slice(len(command) - len(self.passed), None)
-        ]
-        for part in self.parts:
-            width = len(part.names)
-            own = self.angles(part, command) if self._joints else command[at : at + width]
-            at += width
-            result = part.space.decode(np.append(own, 1.0), self.angles(part, start), self.angles(part, last))
-            vector[self.indices(part)] = part.motors.values(result.q)
-            decoded.append(result)
-        return LayoutDecoded(vector, tuple(decoded))
+        actions, others = self.split_encoded(command)
+        seeds, lasts = self.split(start)[0], self.split(last)[0]
+        decoded = tuple(part.space.decode(*each) for part, *each in zip(self.parts, actions, seeds, lasts, strict=True))
+        return LayoutDecoded(self.join([each.q for each in decoded], others), decoded)
 
     @cached_property
-    def _passed_indices(self) -> list[int]:
-        return [self.names.index(name) for name in self.passed]
+    def _others(self) -> list[int]:
+        return [self.names.index(name) for name in self.other_dimensions]
 
     def fitted(self, vectors: ArrayLike) -> "Layout":
         """The same layout with the references (see :mod:`er_il.spaces.references`) that suit joint vectors (N, D)."""
@@ -173,8 +193,8 @@ class Layout:
             space = part.space.spec()
             specs.append(space | {"arm": space["arm"] | arm_spec(part.space.arm)})
         first = self.parts[0]
-        if not first.label and first.motors.plain and self.names == JointSpace(first.space.arm).names:
-            return specs[0]
+        if not first.label and first.motors.plain and self.names == self.of_space(first.space).names:
+            return specs[0] | {"names": list(self.encoded_names)}
         arms = [
             {"label": part.label, "motors": part.motors.spec(), **spec}
             for part, spec in zip(self.parts, specs, strict=True)
@@ -196,11 +216,12 @@ class Layout:
         """
         try:
             if "arms" not in spec:
-                return cls.of_space(from_spec(spec, arm_from_spec(spec["arm"])))
-            parts = (
-                Part(each["label"], from_spec(each, arm_from_spec(each["arm"])), Motors.from_spec(each["motors"]))
-                for each in spec["arms"]
-            )
-            return cls(tuple(spec["joint_names"]), tuple(parts))
+                return cls.of_space(arm_space_from_spec(spec, arm_from_spec(spec["arm"])))
+            return cls(tuple(spec["joint_names"]), tuple(map(_part_from_spec, spec["arms"])))
         except (KeyError, TypeError) as error:
             raise SpecError(f"The action spec is incomplete or damaged ({error}).") from error
+
+
+def _part_from_spec(spec: Mapping[str, Any]) -> Part:
+    space = arm_space_from_spec(spec, arm_from_spec(spec["arm"]))
+    return Part(spec["label"], space, Motors.from_spec(spec["motors"]))

@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from er_il.kinematics.rotation import Quaternion
-from er_il.spaces import ActionSpace
-from er_il.spaces.era import EraSpace
+from er_il.spaces.base import ArmSpace
 from er_il.spaces.pose import PoseSpace
 
 Array = NDArray[np.float64]
@@ -23,7 +22,7 @@ MARGIN = 0.2  # |cosine| of half the angle to the reference, above which no sign
 SAMPLES = 20_000  # postures that references are fitted to
 
 
-def fitted(space: ActionSpace, q: ArrayLike) -> ActionSpace:
+def fitted(space: ArmSpace, q: ArrayLike) -> ArmSpace:
     """The same space with references that suit postures (N, n) [rad].
 
     Those of the arm's home posture stay where they suit, so that datasets encoded one by one agree
@@ -32,17 +31,12 @@ def fitted(space: ActionSpace, q: ArrayLike) -> ActionSpace:
     postures = np.asarray(q, dtype=np.float64)
     postures = postures[np.all(np.isfinite(postures), axis=1)]
     postures = postures[:: 1 + len(postures) // SAMPLES]
-    if not len(postures):
+    if not len(postures) or not isinstance(space, PoseSpace):
         return space
-    if isinstance(space, PoseSpace) and isinstance(space.rotation, Quaternion):
+    if isinstance(space.rotation, Quaternion):
         quaternions = Rotation.from_matrix(space.kinematics.fk_batch(postures)[:, :3, :3]).as_quat()
         space = replace(space, rotation=Quaternion(_hemisphere(quaternions, space.rotation.reference)))
-    if isinstance(space, EraSpace):
-        angles = space.kinematics.arm_angle.along(postures)
-        if np.cos(angles - space.reference).min() < MARGIN - 1.0:
-            mean = np.arctan2(np.sin(angles).mean(), np.cos(angles).mean())
-            space = replace(space, reference=float(np.round(mean, 1)))
-    return space
+    return space.fitted(postures)
 
 
 def _hemisphere(quaternions: Array, home: Sequence[float]) -> tuple[float, float, float, float]:

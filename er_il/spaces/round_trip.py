@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from er_il.arms.arm import Vector
-from er_il.kinematics.solver import LIMIT_MARGIN, Status
-from er_il.spaces import ActionSpace, Decoded
-from er_il.spaces.pose import PoseSpace
+from er_il.kinematics.search import LIMIT_MARGIN
+from er_il.kinematics.solver import IkResult, Status
+from er_il.spaces.base import ArmSpace
 
 EXACT = 1e-3  # [rad] a decode that misses a joint by more has not returned the configuration
 SINGULAR = 2e-2  # a smallest singular value (m and rad mixed) below this explains a miss
@@ -25,13 +25,13 @@ class RoundTrip:
 
     q: Vector  # (n,) [rad]
     seed: Vector  # (n,) [rad]
-    decoded: Decoded
+    decoded: IkResult
     conditioning: float  # at q, see Kinematics.conditioning; infinite in joint space
-    at_limit: bool  # whether a decoded joint is
+    at_limit: bool  # a decoded joint is at its limit
 
     @property
     def exact(self) -> bool:
-        """Whether the configuration came back."""
+        """True if the configuration came back."""
         return float(np.abs(self.decoded.q - self.q).max()) <= EXACT
 
     @property
@@ -49,23 +49,22 @@ class RoundTrip:
 
     @property
     def ambiguous(self) -> bool:
-        """Whether another solution is as good and nearer the seed: action and seed cannot tell which was meant."""
+        """True if another solution is as good and nearer the seed: action and seed cannot tell which was meant."""
         nearer = np.linalg.norm(self.decoded.q - self.seed) <= np.linalg.norm(self.q - self.seed)
         return self.decoded.status is Status.OK and not self.exact and bool(nearer)
 
 
-def round_trips(space: ActionSpace, count: int, *, seed_error: float = 0.1, rng_seed: int = 0) -> list[RoundTrip]:
+def round_trips(space: ArmSpace, count: int, *, seed_error: float = 0.1, rng_seed: int = 0) -> list[RoundTrip]:
     """Sample configurations uniformly within the limits, and seeds within ``seed_error`` [rad] of each joint."""
     arm, rng = space.arm, np.random.default_rng(rng_seed)
     return [round_trip(space, rng.uniform(arm.lower, arm.upper), seed_error, rng) for _ in range(count)]
 
 
-def round_trip(space: ActionSpace, q: Vector, seed_error: float, rng: np.random.Generator) -> RoundTrip:
+def round_trip(space: ArmSpace, q: Vector, seed_error: float, rng: np.random.Generator) -> RoundTrip:
     """Encode a configuration (n,) [rad] and decode it from a seed within ``seed_error`` [rad] of each joint."""
     arm = space.arm
     seed = np.clip(q + rng.uniform(-seed_error, seed_error, arm.dof), arm.lower, arm.upper)
     action = space.encode(q)
     decoded = space.decode(action, seed)
     at_limit = np.any((decoded.q - arm.lower < LIMIT_MARGIN) | (arm.upper - decoded.q < LIMIT_MARGIN))
-    conditioning = space.conditioning(q) if isinstance(space, PoseSpace) else np.inf
-    return RoundTrip(q, seed, decoded, conditioning, bool(at_limit))
+    return RoundTrip(q, seed, decoded, space.conditioning(q), bool(at_limit))

@@ -8,8 +8,9 @@ import rerun as rr
 from scipy.spatial.transform import Rotation
 
 from er_il.evaluation.trace import Array, Trace
+from er_il.kinematics.arm_angle import ArmAngle
 from er_il.kinematics.solver import Status
-from er_il.spaces import ActionSpace
+from er_il.spaces.action_space import ActionSpace
 
 JOINTS, END_EFFECTOR, REDUNDANCY, ACTION = GROUPS = ("joints", "end_effector", "redundancy", "action")
 STATUS = "status"
@@ -73,7 +74,7 @@ def curves_of(trace: Trace, space: ActionSpace) -> list[Curve]:
 
 def _arm_angle(trace: Trace, space: ActionSpace) -> Curve:
     """The arm angle without jumps at half a turn, the command on the measured one's turn."""
-    measured, command = (space.kinematics.arm_angle.along(q) for q in (trace.q, trace.command))
+    measured, command = (ArmAngle(space.arm).wrapped(q) for q in (trace.q, trace.command))
     apart = (command - measured + np.pi) % (2 * np.pi) - np.pi
     continuous: Array = np.unwrap(measured).astype(np.float64)
     return Curve(REDUNDANCY, ARM_ANGLE, "rad", {MEASURED: continuous, COMMAND: continuous + apart})

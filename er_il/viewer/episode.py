@@ -11,7 +11,7 @@ from er_il.datasets.encoding import dataset_info, dataset_layout, joints_column,
 from er_il.datasets.rewriting import episode_slices, read_episode_numbers, read_vectors
 from er_il.datasets.schema import DEMO_SEED, ENVIRONMENT_STATE, STATE, dimension_names
 from er_il.evaluation.trace import Array, Trace
-from er_il.spaces import JointSpace
+from er_il.spaces.action_space import ActionSpace
 from er_il.spaces.layout import Layout, Part
 from er_il.support.errors import DatasetError, UnknownNameError
 from er_il.viewer.column import DATA, read_rows
@@ -47,11 +47,8 @@ def trace_of_episode(dataset: Path, number: int, arm: str = "") -> Trace:
     command = layout.angles(part, decoded.vectors)
     state_names, state = _vectors(dataset, info, STATE, rows[number])
     environment_state_names, environment_state = _vectors(dataset, info, ENVIRONMENT_STATE, rows[number])
-    if layout.kind == JointSpace.kind:
-        action = layout.angles(part, episode.actions)
-    else:
-        action = episode.actions[:, [layout.encoded_names.index(name) for name in part.names]]
-    spec = part.space.spec()
+    action = layout.split_encoded(episode.actions)[0][layout.parts.index(part)]
+    spec = ActionSpace(part.space).spec()  # the trace has the gripper's opening beside the arm's action
     return Trace(
         task="",
         seed=_seed(dataset, number) if DEMO_SEED in info.features else 0,

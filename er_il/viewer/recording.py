@@ -8,7 +8,7 @@ import rerun as rr
 from er_il.arms.portable import arm_from_spec
 from er_il.evaluation.trace import Trace
 from er_il.kinematics.solver import Status
-from er_il.spaces import from_spec
+from er_il.spaces.action_space import from_spec
 from er_il.support.shapes import Shape
 from er_il.viewer.arm import log_arm
 from er_il.viewer.blueprint import ABOUT, FRAME, TIME, blueprint

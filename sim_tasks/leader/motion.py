@@ -1,6 +1,6 @@
 """From keyframes to a motion: collision-checked IK with a chosen elbow, then smooth timing."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -9,6 +9,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.spatial.transform import Rotation, Slerp
 
 from er_il.arms.arm import Arm, Vector
+from er_il.kinematics.redundancy import JointAngle
 from er_il.kinematics.solver import Status, kinematics_of
 from er_il.support.errors import PlanError
 
@@ -75,7 +76,7 @@ def solve_keyframe(arm: Arm, keyframe: Keyframe, seed: Vector, is_free: Callable
     offsets = [sign * offset for offset in ELBOW_SEARCH for sign in (1, -1)]
     for offset in offsets:
         fixed = wishes | {elbow: wishes[elbow] + offset}
-        ik = kinematics_of(arm).solve(keyframe.T_base_ee, seed, fixed=fixed)
+        ik = kinematics_of(arm).solve(keyframe.T_base_ee, seed, *joint_angles(arm, fixed))
         if ik.status is Status.OK and is_free(ik.q):
             return ik.q
     x, y, z = keyframe.T_base_ee[:3, 3]
@@ -91,7 +92,7 @@ def _wishes(arm: Arm, keyframe: Keyframe, seed: Vector) -> dict[str, float]:
     if keyframe.elbow is not None:
         wishes[elbow] = keyframe.elbow
     if left := [joint for joint in arm.redundant if joint not in wishes]:
-        nearest = kinematics_of(arm).solve(keyframe.T_base_ee, seed, fixed=wishes).q
+        nearest = kinematics_of(arm).solve(keyframe.T_base_ee, seed, *joint_angles(arm, wishes)).q
         # Free joints differ in the last bits from process to process; a rounded wish leads all to the same plan.
         wishes |= {joint: round(float(nearest[arm.joints.index(joint)]), 4) for joint in left}
     return wishes
@@ -118,6 +119,11 @@ def plan_stretch(
     return path
 
 
+def joint_angles(arm: Arm, angles: Mapping[str, float]) -> tuple[JointAngle, list[float]]:
+    """The redundancy and its values that hold joints at angles [rad]."""
+    return JointAngle(arm, tuple(angles)), list(angles.values())
+
+
 def _straight(arm: Arm, start: Vector, goal: Vector, keyframe: Keyframe) -> list[Vector]:
     """Waypoints after the start along a straight line of the hand, the redundant joints turning evenly."""
     kinematics = kinematics_of(arm)
@@ -131,7 +137,7 @@ def _straight(arm: Arm, start: Vector, goal: Vector, keyframe: Keyframe) -> list
         T[:3, :3] = turn(t).as_matrix()
         T[:3, 3] = (1 - t) * T_start[:3, 3] + t * T_goal[:3, 3]
         angles = {joint: (1 - t) * start[i] + t * goal[i] for joint, i in redundant.items()}
-        ik = kinematics.solve(T, waypoints[-1], fixed=angles)
+        ik = kinematics.solve(T, waypoints[-1], *joint_angles(arm, angles))
         if ik.status is not Status.OK:
             raise PlanError("The hand cannot follow the straight line to a keyframe.")
         waypoints.append(ik.q)

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from er_il.kinematics.solver import Status, kinematics_of
 from er_il.support.errors import PlanError
-from sim_tasks.leader.motion import Keyframe, Stretch, plan_stretch
+from sim_tasks.leader.motion import Keyframe, Stretch, joint_angles, plan_stretch
 from sim_tasks.tasks.arm_task import ArmTask, Placement
 from sim_tasks.world.contact import touching
 from sim_tasks.world.props import PushButton
@@ -128,7 +128,7 @@ class PushButtonElbow(ArmTask):
         *below, elbow = self.arm.redundant
         leaning = dict.fromkeys(below, self.lean)
         for angle in np.arange(RAISED, LOW, TURN).tolist():
-            ik = kinematics_of(self.arm).solve(T_base_ee, q, fixed=leaning | {elbow: angle})
+            ik = kinematics_of(self.arm).solve(T_base_ee, q, *joint_angles(self.arm, leaning | {elbow: angle}))
             if ik.status is not Status.OK:
                 break
             q = ik.q

@@ -20,8 +20,8 @@ from er_il.arms.arm import Arm, Vector
 from er_il.arms.urdf import generated_urdf
 from er_il.kinematics.solver import kinematics_of
 from er_il.report.markdown import markdown_table
-from er_il.spaces import make_action_space
 from er_il.spaces.pose import PoseSpace
+from er_il.spaces.registry import make_arm_space
 from er_il.support.atomic_files import write_json
 from er_il.support.errors import ArmError
 from er_il.support.provenance import provenance
@@ -126,7 +126,7 @@ def _lerobot(arm: Arm) -> Solver:
 
 def _ours(kind: str, arm: Arm) -> Solver:
     """An action space, told the pose and the redundancy that the start has."""
-    space = make_action_space(kind, arm)
+    space = make_arm_space(kind, arm)
     assert isinstance(space, PoseSpace)
-    redundancy = space.redundancy(arm.home[None])[0]
-    return lambda pose, seed: space.decode_pose(pose, redundancy, seed).q
+    redundancy = space.redundancy_along(arm.home[None])[0]
+    return lambda pose, seed: space.solve(pose, redundancy, seed).q

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from er_il.arms.arm import Arm
 from er_il.datasets.joint_path import JointPath
 from er_il.kinematics.solver import Status, kinematics_of
-from er_il.spaces import SPACES, make_action_space
 from er_il.spaces.delta import PREFIX, DeltaSpace
+from er_il.spaces.registry import SPACES, make_arm_space
 
 Array = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ def study_deltas(arm: Arm, demos: Mapping[str, Sequence[JointPath]]) -> dict[str
         ArmError: an ER space does not suit the arm.
     """
     paths = [path.commanded for of_set in demos.values() for path in of_set]
-    spaces = (make_action_space(PREFIX + kind, arm) for kind in SPACES)
+    spaces = (make_arm_space(PREFIX + kind, arm) for kind in SPACES)
     return {"drifts": [vars(_drift(space, paths)) for space in spaces if isinstance(space, DeltaSpace)]}
 
 

@@ -10,7 +10,7 @@ from er_il.datasets.joint_path import ArmPaths, JointPath
 from er_il.datasets.joint_paths import read_joint_paths
 from er_il.datasets.recipe import Recipe, recipe_names
 from er_il.datasets.recording import generate
-from er_il.spaces import JointSpace
+from er_il.spaces.joint import JOINT
 from er_il.support.errors import DatasetError, UnknownNameError
 
 
@@ -39,12 +39,12 @@ def study_demos(
         if not dataset.is_dir():
             if name not in recipe_names():
                 raise UnknownNameError("dataset or task", name, ["the folder of a dataset", *recipe_names()])
-            made = generate(Recipe.load(name).resized(episodes), [JointSpace.kind], folder / name, progress, workers)
-            dataset = made.paths[JointSpace.kind]
+            made = generate(Recipe.load(name).resized(episodes), [JOINT], folder / name, progress, workers)
+            dataset = made.paths[JOINT]
         first, *others = read_joint_paths(dataset, workers=workers)
         if others:
             raise DatasetError(f"{name} is of several arms; a study is of one. er-il advise looks at each.")
-        found[_unique(dataset.parent.name if dataset.name == JointSpace.kind else dataset.name, found)] = first
+        found[_unique(dataset.parent.name if dataset.name == JOINT else dataset.name, found)] = first
     arms = [paths.arm for paths in found.values()]
     if not arms:
         raise DatasetError("Name a dataset or a task, such as reach_cup.")

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from er_il.experiments.studies.joint_notes import joined
-from er_il.spaces import split_name
+from er_il.spaces.registry import split_name
 from er_il.support.errors import DatasetError
 
 KEYS = ("task", "decoder", "successes", "episodes", "interval")

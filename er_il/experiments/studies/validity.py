@@ -24,9 +24,10 @@ from er_il.arms.arm import Arm, Vector
 from er_il.control.commander import Commander
 from er_il.evaluation.statistics import exact_interval
 from er_il.kinematics.solver import Status
-from er_il.spaces import ActionSpace, DeltaBounds, make_action_space
-from er_il.spaces.delta import make_delta_space
+from er_il.spaces.base import ArmSpace
+from er_il.spaces.delta import DeltaBounds, DeltaSpace
 from er_il.spaces.pose import PoseSpace
+from er_il.spaces.registry import make_arm_space
 from er_il.support.workers import run_jobs
 
 Array = NDArray[np.float64]
@@ -98,7 +99,7 @@ def study_validity(
         ArmError: ERJ or ERA does not suit the arm.
     """
     for space in SPACES:
-        make_action_space(space, arm)  # told before anything starts
+        make_arm_space(space, arm)  # told before anything starts
     rng = np.random.default_rng(0)
     states = {
         DEMOS: demos[rng.integers(len(demos), size=samples)],
@@ -114,11 +115,11 @@ def study_validity(
 
 def measure(cell: Cell, arm: Arm, states: Array) -> Outcome:
     """Draw an action at each state (N, n) [rad], and decode it."""
-    absolute = make_action_space(cell.space, arm)
+    absolute = make_arm_space(cell.space, arm)
     assert isinstance(absolute, PoseSpace)
     absolute = replace(absolute, damped=cell.damped)
     bounds = DeltaBounds(cell.size, TURN * cell.size, TURN * cell.size)
-    space = make_delta_space(absolute, bounds) if cell.mode == "delta" else absolute
+    space = DeltaSpace(arm, absolute, bounds) if cell.mode == "delta" else absolute
     rng = np.random.default_rng([MODES.index(cell.mode), SIZES.index(cell.size)])
     commander = Commander(space, PERIOD)
     statuses, iterations, latencies = Counter[str](), [], []
@@ -136,10 +137,10 @@ def measure(cell: Cell, arm: Arm, states: Array) -> Outcome:
     return Outcome(cell, statuses, tuple(iterations), tuple(latencies))
 
 
-def _changed(space: ActionSpace, cell: Cell, q: Vector, rng: np.random.Generator) -> Array:
+def _changed(space: ArmSpace, cell: Cell, q: Vector, rng: np.random.Generator) -> Array:
     """An action at a state. The errors of the pose come first, so that they are the same in all spaces."""
     action = space.encode(q)
-    commands = len(action) - 1
+    commands = len(action)
     if cell.mode == "delta":
         scales = np.array([cell.size] * 3 + [TURN * cell.size] * 4)[:commands]
         errors = rng.uniform(-1.0, 1.0, 7)[:commands]

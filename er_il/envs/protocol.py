@@ -1,0 +1,88 @@
+"""The interface of a joint-level arm environment, by which er_il knows simulated tasks, its own and others'."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any, Protocol, runtime_checkable
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+from er_il.arms.arm import Arm, Vector
+from er_il.support.errors import ErIlError
+from er_il.support.shapes import Shape
+
+
+@runtime_checkable
+class ArmEnv(Protocol):
+    """A Gymnasium environment of one arm and its gripper, commanded in joint positions.
+
+    Action: (n + 1,) joint position targets [rad] and the gripper's opening in [0, 1] (1 open). Observation: a dict
+    with ``agent_pos`` (joint positions, gripper opening, end-effector position and quaternion), ``environment_state``
+    (object poses) and, with cameras, ``pixels``. Every ``info`` holds ``is_success`` and ``failure`` ("" if none).
+    """
+
+    arm: Arm
+    task_description: str
+
+    @property
+    def joint_positions(self) -> Vector:
+        """The arm's true joint angles (n,) [rad]."""
+        ...
+
+    @property
+    def gripper_opening(self) -> float:
+        """The gripper's true opening in [0, 1]."""
+        ...
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Names of ``agent_pos``."""
+        ...
+
+    @property
+    def environment_state_names(self) -> tuple[str, ...]:
+        """Names of ``environment_state``."""
+        ...
+
+    def scene_geometry(self) -> Sequence[Shape]:
+        """The world around the robot as shapes to draw, as of the last reset."""
+        ...
+
+    def leader(self, seed: int) -> Iterator[NDArray[np.float64]]:
+        """The actions (n + 1,) of a demonstration of the episode just reset, one a control period.
+
+        Raises:
+            PlanError: no collision-free motion exists; known before the first action.
+        """
+        ...
+
+    def render(self) -> Any:
+        """A picture (H, W, 3) uint8 of the scene for people."""
+        ...
+
+
+MEMBERS = (
+    "arm",
+    "task_description",
+    "joint_positions",
+    "gripper_opening",
+    "state_names",
+    "environment_state_names",
+    "scene_geometry",
+    "leader",
+    "render",
+)
+
+
+def arm_env(env: gymnasium.Env[Any, Any]) -> ArmEnv:
+    """The arm environment under an environment's wrappers.
+
+    Raises:
+        ErIlError: it is none.
+    """
+    inner = env.unwrapped
+    if not isinstance(inner, ArmEnv):
+        name = env.spec.id if env.spec else type(inner).__name__
+        members = [member for member in MEMBERS if not hasattr(inner, member)]
+        raise ErIlError(f"{name} is no arm environment: it lacks {', '.join(members)}.")
+    return inner

@@ -1,0 +1,145 @@
+"""Action spaces by name, and from specifications."""
+
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from typing import Any
+
+from er_il.arms.arm import Arm, Vector
+from er_il.kinematics.arm_angle import ArmAngle
+from er_il.kinematics.redundancy import JointAngle, Redundancy
+from er_il.kinematics.rotation import Quaternion, RotationCode, make_rotation
+from er_il.kinematics.solver import kinematics_of
+from er_il.spaces.base import ArmSpace
+from er_il.spaces.delta import PREFIX, DeltaBounds, DeltaSpace
+from er_il.spaces.joint import JOINT, JointSpace
+from er_il.spaces.pose import TASK, PoseSpace
+from er_il.spaces.spec import SPEC_VERSION
+from er_il.support.errors import ArmError, SpecError, UnknownNameError
+
+
+def _joint_angle(arm: Arm) -> Redundancy:
+    return JointAngle(arm, arm.redundant)
+
+
+def _arm_angle(arm: Arm) -> Redundancy:
+    if arm.redundancy > 1:
+        raise ArmError(f"{arm.name} has {arm.redundancy} redundant joints; one arm angle fixes only one. Use erj.")
+    return ArmAngle.from_home(arm)
+
+
+ERJ, ERA = "erj", "era"
+REDUNDANCIES: dict[str, Callable[[Arm], Redundancy]] = {ERJ: _joint_angle, ERA: _arm_angle}  # of the ER spaces
+SPACES = (JOINT, TASK, *REDUNDANCIES)
+
+AT, AND = "@", "+"  # as in erj@panda_joint3, or erj@panda_joint1+panda_joint3 with two redundant joints
+
+
+def make_arm_space(
+    name: str,
+    arm: Arm,
+    *,
+    rotation: str = Quaternion.kind,
+    posture: Vector | None = None,
+    bounds: DeltaBounds | None = None,
+) -> ArmSpace:
+    """Build the action space of an arm, without a gripper, by name.
+
+    Args:
+        name: ``joint``, ``task``, ``erj`` or ``era``; with ``delta_`` in front, changes of its commands.
+            ``erj@<joint>`` commands another than the arm's default joint; several are joined by ``+``.
+        arm: The arm it commands.
+        rotation: ``quat`` or ``rot6d``; the quaternion's hemisphere is that of the arm's home pose.
+            Deltas always use a rotation vector.
+        posture: (n,) [rad] null-space posture for ``task``; without it IK stays near the seed.
+        bounds: Largest changes of a delta space.
+
+    Raises:
+        UnknownNameError: unknown name or rotation.
+        ArmError: an ER space for an arm without redundancy, ERA without the arm's angle frames, or joints that
+            the arm does not have.
+    """
+    kind, joints = split_name(name)
+    arm = arm.commanding(joints) if joints else arm
+    code = make_rotation(rotation, kinematics_of(arm).fk(arm.home)[:3, :3])
+    space = _absolute(kind.removeprefix(PREFIX), arm, code, posture)
+    return DeltaSpace(arm, space, bounds or DeltaBounds()) if kind.startswith(PREFIX) else space
+
+
+def split_name(name: str) -> tuple[str, tuple[str, ...]]:
+    """Split a space's name into its kind and the joints that it says ERJ commands, () if it says nothing.
+
+    Raises:
+        UnknownNameError: no such kind, or joints for a kind that commands none.
+    """
+    kind, at, joints = name.partition(AT)
+    if kind.removeprefix(PREFIX) not in SPACES:
+        raise UnknownNameError("action space", kind, [*SPACES, *(PREFIX + space for space in SPACES)])
+    if at and (kind.removeprefix(PREFIX) != ERJ or not joints):
+        raise UnknownNameError("action space", name, [*SPACES, f"{ERJ}{AT}JOINT"])
+    return kind, tuple(joints.split(AND)) if at else ()
+
+
+def check_space(name: str) -> None:
+    """Raise an :class:`UnknownNameError` unless a name is that of an absolute space."""
+    if split_name(name)[0] not in SPACES:
+        raise UnknownNameError("action space", name, SPACES)
+
+
+def name_of(space: ArmSpace, arm: Arm) -> str:
+    """Name a space as :func:`make_arm_space` would make it for ``arm``."""
+    commands_others = space.kind.removeprefix(PREFIX) == ERJ and space.arm.redundant != arm.redundant
+    return space.kind + (AT + AND.join(space.arm.redundant) if commands_others else "")
+
+
+def arm_space_from_spec(spec: Mapping[str, Any], arm: Arm | None = None, *, posture: Vector | None = None) -> ArmSpace:
+    """Rebuild the space that :meth:`er_il.spaces.base.ArmSpace.spec` described.
+
+    Args:
+        spec: The specification, as read from a dataset's ``features["action"]["info"]["er_il"]``.
+        arm: The arm, for arms that are no preset.
+        posture: See :func:`make_arm_space`.
+
+    Raises:
+        SpecError: the specification is of another version, incomplete, or of another arm.
+    """
+    if spec.get("version") != SPEC_VERSION:
+        raise SpecError(f"Action spec has version {spec.get('version')!r}; this er_il reads {SPEC_VERSION}.")
+    try:
+        described, kind = spec["arm"], spec["space"]
+        arm = arm if arm is not None else Arm.preset(described["name"])
+        with suppress(ArmError):  # an arm without those joints is told below what differs
+            arm = arm.commanding(described["redundant"])
+        rotation: RotationCode = make_rotation(
+            spec.get("rotation", Quaternion.kind), kinematics_of(arm).fk(arm.home)[:3, :3]
+        )
+        if "hemisphere" in spec:
+            rotation = Quaternion(tuple(spec["hemisphere"]))
+        absolute = split_name(kind)[0].removeprefix(PREFIX)
+        space = _absolute(absolute, arm, rotation, posture, spec)
+        if kind.startswith(PREFIX):
+            space = DeltaSpace(arm, space, DeltaBounds(**spec["bounds"]))
+        expected = {key: described[key] for key in ("joints", "base_frame", "ee_frame", "redundant", "fingerprint")}
+    except KeyError as error:
+        raise SpecError(f"Action spec has no {error}.") from error
+    actual = space.spec()["arm"]
+    for key, value in expected.items():
+        if actual[key] != value:
+            raise SpecError(f"The action spec is for {key} {value}, but the arm {arm.name!r} has {actual[key]}.")
+    return space
+
+
+def _absolute(
+    kind: str, arm: Arm, rotation: RotationCode, posture: Vector | None, spec: Mapping[str, Any] | None = None
+) -> ArmSpace:
+    """An absolute space, with the conventions of a specification if one is given."""
+    if kind == JOINT:
+        return JointSpace(arm)
+    if kind == TASK:
+        return PoseSpace(arm, rotation, posture=posture)
+    if arm.redundancy == 0:
+        raise ArmError(
+            f"{arm.name} has {arm.dof} joints and so no redundancy: an end-effector pose already fixes them. "
+            "Use joint or task."
+        )
+    redundancy = REDUNDANCIES[kind](arm)
+    return PoseSpace(arm, rotation, kind, redundancy if spec is None else redundancy.restored(spec))
