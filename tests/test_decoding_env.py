@@ -6,7 +6,8 @@ from gymnasium.utils.env_checker import check_env
 from er_il.envs.decoders import DECODERS, Decoder, decoder
 from er_il.envs.tasks import task_id, task_names
 from er_il.envs.wrapper import make_action_space_env
-from er_il.support.errors import UnknownNameError
+from er_il.kinematics.solver import kinematics_of
+from er_il.support.errors import ErIlError, UnknownNameError
 
 REACH = task_id("reach_cup")
 
@@ -32,6 +33,38 @@ def test_it_is_a_gymnasium_environment(name: str):
     env = make_action_space_env(REACH, DECODERS[name])
     check_env(env, skip_render_check=True)
     env.close()
+
+
+@pytest.mark.parametrize("name", ["delta_joint", "delta_task", "delta_erj", "delta_era"])
+def test_deltas_have_a_finite_box_and_move_the_arm_by_what_they_say(name: str):
+    env = make_action_space_env(REACH, Decoder(name))
+    box = env.action_space
+    assert isinstance(box, gymnasium.spaces.Box)
+    assert np.all(np.isfinite(box.low)) and np.all(np.isfinite(box.high))
+    assert box.contains(box.sample()) and box.high[-1] == 1.0 and box.low[-1] == 0.0
+    env.reset(seed=3)
+    start = env.world.joint_positions
+    T_start = kinematics_of(env.world.arm).fk(start)
+    change = np.zeros(box.shape)
+    change[0] = 0.01
+    change[-1] = 1.0
+    for _ in range(6):
+        *_, info = env.step(change.astype(np.float32))
+        assert info["decode_status"] == "ok"
+    T_end = kinematics_of(env.world.arm).fk(info["command"])
+    if name == "delta_joint":
+        np.testing.assert_allclose(info["command"] - start, [0.06, 0, 0, 0, 0, 0, 0], atol=1e-6)
+    else:
+        np.testing.assert_allclose(T_end[:3, 3] - T_start[:3, 3], [0.06, 0.0, 0.0], atol=1e-4)
+    env.close()
+
+
+def test_an_environment_that_is_no_arm_is_refused_in_one_line():
+    with pytest.raises(
+        ErIlError,
+        match=r"^CartPole-v1 is no arm environment: it lacks arm, task_description, ",
+    ):
+        make_action_space_env("CartPole-v1", DECODERS["joint"])
 
 
 def test_encoded_actions_move_the_arm_as_joint_targets_do():

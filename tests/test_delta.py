@@ -153,3 +153,11 @@ def test_wrong_input_is_refused():
         make_action_space("delta_ik", PANDA)
     invalid = space.decode(np.full(8, np.nan), PANDA.home)
     assert invalid.status is Status.INVALID
+
+
+def test_default_bounds_are_what_the_arm_does_in_a_period():
+    for arm in map(Arm.preset, ("panda", "xarm7", "gen3")):
+        space = make_action_space("delta_joint", arm)
+        assert np.all(limits(space) <= arm.velocity.max() * 0.05 + 1e-3)
+        q = arm.home + 0.99 * 0.05 * arm.velocity * np.array([1, -1, 1, 1, -1, 1, -1])
+        np.testing.assert_allclose(space.encode(q, start=arm.home)[:-1], q - arm.home)  # at full speed, not refused

@@ -48,6 +48,15 @@ class ArmEnv(Protocol):
         """The world around the robot as shapes to draw, as of the last reset."""
         ...
 
+    def render(self) -> Any:
+        """A picture (H, W, 3) uint8 of the scene for people."""
+        ...
+
+
+@runtime_checkable
+class DemonstrableEnv(ArmEnv, Protocol):
+    """An arm environment with a scripted leader."""
+
     def leader(self, seed: int) -> Iterator[NDArray[np.float64]]:
         """The actions (n + 1,) of a demonstration of the episode just reset, one a control period.
 
@@ -56,23 +65,6 @@ class ArmEnv(Protocol):
         """
         ...
 
-    def render(self) -> Any:
-        """A picture (H, W, 3) uint8 of the scene for people."""
-        ...
-
-
-MEMBERS = (
-    "arm",
-    "task_description",
-    "joint_positions",
-    "gripper_opening",
-    "state_names",
-    "environment_state_names",
-    "scene_geometry",
-    "leader",
-    "render",
-)
-
 
 def arm_env(env: gymnasium.Env[Any, Any]) -> ArmEnv:
     """The arm environment under an environment's wrappers.
@@ -80,9 +72,23 @@ def arm_env(env: gymnasium.Env[Any, Any]) -> ArmEnv:
     Raises:
         ErIlError: it is none.
     """
+    return _inner(env, ArmEnv, "arm environment")
+
+
+def demonstrable_env(env: gymnasium.Env[Any, Any]) -> DemonstrableEnv:
+    """The arm environment under an environment's wrappers, with its leader.
+
+    Raises:
+        ErIlError: it is none, or has no leader.
+    """
+    return _inner(env, DemonstrableEnv, "arm environment with a leader")
+
+
+def _inner[T: ArmEnv](env: gymnasium.Env[Any, Any], protocol: type[T], what: str) -> T:
     inner = env.unwrapped
-    if not isinstance(inner, ArmEnv):
+    if not isinstance(inner, protocol):
         name = env.spec.id if env.spec else type(inner).__name__
-        members = [member for member in MEMBERS if not hasattr(inner, member)]
-        raise ErIlError(f"{name} is no arm environment: it lacks {', '.join(members)}.")
+        members = dict.fromkeys((*ArmEnv.__annotations__, *vars(ArmEnv), *vars(protocol)))
+        missing = [member for member in members if not member.startswith("_") and not hasattr(inner, member)]
+        raise ErIlError(f"{name} is no {what}: it lacks {', '.join(missing)}.")
     return inner

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from er_il.arms.arm import Vector
+from er_il.arms.arm import Arm, Vector
 from er_il.kinematics.solver import IkResult, Status
 from er_il.spaces.base import ArmSpace, Array
 from er_il.spaces.pose import PoseSpace
@@ -24,6 +24,7 @@ from er_il.support.errors import BoundsError
 
 PREFIX = "delta_"  # of the space's name in a spec
 POSE_NAMES = ("ee.dx", "ee.dy", "ee.dz", "ee.drx", "ee.dry", "ee.drz")
+PERIOD = 0.05  # [s] of control, by which default bounds are chosen
 TOLERANCE = 1e-6  # [1] share of a bound by which rounding to float32 may exceed it
 
 
@@ -32,8 +33,13 @@ class DeltaBounds:
     """Largest change of one dimension in one step."""
 
     position: float = 0.1  # [m]
-    rotation: float = 0.3  # [rad] of a component of the rotation vector
-    angle: float = 0.3  # [rad] of a joint or an arm angle
+    rotation: float = 0.3  # [rad] of a component of the rotation vector; several joints turn the hand at once
+    angle: float = 0.1  # [rad] of a joint or an arm angle
+
+    @classmethod
+    def of_arm(cls, arm: Arm) -> "DeltaBounds":
+        """The default bounds of an arm: a joint changes by no more than the fastest one turns in ``PERIOD``."""
+        return cls(angle=round(float(arm.velocity.max()) * PERIOD, 3))
 
 
 @dataclass(frozen=True, eq=False)

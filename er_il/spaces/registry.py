@@ -51,7 +51,7 @@ def make_arm_space(
         rotation: ``quat`` or ``rot6d``; the quaternion's hemisphere is that of the arm's home pose.
             Deltas always use a rotation vector.
         posture: (n,) [rad] null-space posture for ``task``; without it IK stays near the seed.
-        bounds: Largest changes of a delta space.
+        bounds: Largest changes of a delta space; by default what the arm can do in a period of 20 Hz.
 
     Raises:
         UnknownNameError: unknown name or rotation.
@@ -62,7 +62,7 @@ def make_arm_space(
     arm = arm.commanding(joints) if joints else arm
     code = make_rotation(rotation, kinematics_of(arm).fk(arm.home)[:3, :3])
     space = _absolute(kind.removeprefix(PREFIX), arm, code, posture)
-    return DeltaSpace(arm, space, bounds or DeltaBounds()) if kind.startswith(PREFIX) else space
+    return DeltaSpace(arm, space, bounds or DeltaBounds.of_arm(arm)) if kind.startswith(PREFIX) else space
 
 
 def split_name(name: str) -> tuple[str, tuple[str, ...]]:

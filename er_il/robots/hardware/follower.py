@@ -10,6 +10,7 @@ from lerobot.lerobot_types import RobotAction, RobotObservation
 from lerobot.robots import Robot, RobotConfig
 from lerobot.utils.decorators import check_if_already_connected, check_if_not_connected
 
+from er_il.envs.protocol import arm_env
 from er_il.envs.tasks import task_id
 from er_il.robots.hardware.calibration import NeedsNoCalibration
 from er_il.robots.hardware.episodes import EpisodeAnnouncements
@@ -69,7 +70,7 @@ class SimFollower(NeedsNoCalibration, Robot):
             cameras=tuple(config.camera_names),
             image_size=config.image_size,
         )
-        world: Any = self._env.unwrapped
+        world = arm_env(self._env)
         self._joints = JointNames(world.arm.joints, config.units)
         self._pose_names = tuple(f"{name}{POSITION}" for name in world.state_names[len(self._joints.names) :])
         size = config.image_size

@@ -11,6 +11,7 @@ from lerobot.teleoperators import Teleoperator, TeleoperatorConfig
 from lerobot.utils.decorators import check_if_already_connected, check_if_not_connected
 
 from er_il.arms.arm import Vector
+from er_il.envs.protocol import demonstrable_env
 from er_il.envs.tasks import task_id
 from er_il.robots.hardware.calibration import NeedsNoCalibration
 from er_il.robots.hardware.episodes import EpisodeAnnouncements
@@ -56,8 +57,8 @@ class ScriptedLeader(NeedsNoCalibration, Teleoperator):
         self._env: gymnasium.Env[Any, Any] = gymnasium.make(
             task_id(config.task), max_episode_steps=-1, disable_env_checker=True, arm=config.arm
         )
-        world: Any = self._env.unwrapped
-        self._joints = JointNames(world.arm.joints, config.units)
+        self._world = demonstrable_env(self._env)
+        self._joints = JointNames(self._world.arm.joints, config.units)
         self._announcements = EpisodeAnnouncements()
         self._script: Iterator[Vector] | None = None
         self._last: Vector = np.zeros(len(self._joints.names))
@@ -105,6 +106,5 @@ class ScriptedLeader(NeedsNoCalibration, Teleoperator):
         """
         seed = self.config.seed + episode
         self._env.reset(seed=seed)
-        world: Any = self._env.unwrapped
-        self._script = world.leader(seed)
+        self._script = self._world.leader(seed)
         self._episode = episode
