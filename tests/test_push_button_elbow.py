@@ -6,7 +6,8 @@ from playing import play
 
 from er_il.kinematics.solver import Status, kinematics_of
 from er_il.spaces import make_action_space
-from sim_tasks.tasks.push_button_elbow import BUTTON, DEPTH, PEDESTAL, PRESSED, PushButtonElbow
+from sim_tasks.leader.scripts.button import DEPTH
+from sim_tasks.tasks.push_button_elbow import BUTTON, PEDESTAL, PRESSED, PushButtonElbow
 
 STEPS = 25  # control steps from one of the hand's places to the next
 
