@@ -1,4 +1,4 @@
-"""Episodes of a world, played."""
+"""Playing episodes."""
 
 from collections.abc import Iterable
 
@@ -8,9 +8,9 @@ from sim_tasks.tasks.arm_task import ArmTask
 
 
 def play(world: ArmTask, actions: Iterable[np.ndarray]) -> str:
-    """Outcome of an episode: ``success``, a failure, or nothing."""
+    """Outcome of an episode: ``success``, the failure, or an empty string if the actions end first."""
     for action in actions:
-        _, _, terminated, _, info = world.step(action)
-        if terminated or info["failure"]:
+        _, _, terminated, truncated, info = world.step(action)
+        if terminated or truncated:
             return info["failure"] or "success"
     return ""

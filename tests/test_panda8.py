@@ -12,7 +12,7 @@ from lerobot.policies.act.configuration_act import ACTConfig
 from er_il import Arm, make_action_space
 from er_il.envs.contract import Contract
 from er_il.envs.decoders import Decoder
-from er_il.envs.wrapper import make_decoding_env
+from er_il.envs.wrapper import make_action_space_env
 from er_il.policy.actor import environment_of
 from er_il.support.errors import UnknownNameError
 from sim_tasks.tasks.arm_task import ArmTask
@@ -36,7 +36,7 @@ def test_the_leader_leans_and_succeeds_and_so_do_its_encoded_actions(task: str) 
     assert demo.shape[1] == 9
     assert np.ptp(demo[:, 0]) > 0.05  # the new joint leans
     for kind in ("joint", "erj"):
-        decoding = make_decoding_env(f"sim_tasks/{task}-v0", Decoder(kind), arm="panda8")
+        decoding = make_action_space_env(f"sim_tasks/{task}-v0", Decoder(kind), arm="panda8")
         decoding.reset(seed=0)
         assert decoding.action_space.shape == ({"joint": 9, "erj": 10}[kind],)
         info: dict = {}
@@ -53,19 +53,19 @@ def test_the_furniture_stands_as_high_before_its_shoulder_as_before_the_pandas()
     for arm in ("panda", "panda8"):
         world = LiftCup(arm=arm)
         world.reset(seed=0)
-        T_base_shoulder = world._data.body("panda_link1").xpos
+        T_base_shoulder = world.data.body("panda_link1").xpos
         heights[arm] = world.object_pose("cup")[2] - T_base_shoulder[2]
         stand = next(shape for shape in world.scene_geometry() if shape.name == "stand_top")
         assert stand.T_parent_shape[2, 3] + stand.size[2] == pytest.approx(world.object_pose("cup")[2])
     assert heights["panda8"] == pytest.approx(heights["panda"], abs=1e-6)
-    assert world.lift == pytest.approx(0.316)
+    assert world.shoulder_offset == pytest.approx(0.316)
 
 
 def test_it_rests_at_home_without_touching_itself_or_sagging() -> None:
     _, world = make("LiftCup")
     world.reset(seed=0)
-    touching = [set(world._model.geom_bodyid[contact.geom].tolist()) for contact in world._data.contact]
-    assert not any(bodies <= world._robot.bodies for bodies in touching)
+    touching = [set(world.model.geom_bodyid[contact.geom].tolist()) for contact in world.data.contact]
+    assert not any(bodies <= world.robot.bodies for bodies in touching)
     start = world.joint_positions
     for _ in range(20):
         world.step(np.append(start, 1.0))

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 from playing import play
 
+from er_il.kinematics.redundancy import JointAngle
 from er_il.kinematics.solver import Status, kinematics_of
-from er_il.spaces.action_space import make_action_space
-from sim_tasks.tasks.push_button_elbow import BUTTON, DEPTH, PEDESTAL, PRESSED, PushButtonElbow
+from er_il.spaces import make_action_space
+from sim_tasks.leader.scripts.button import DEPTH
+from sim_tasks.tasks.push_button_elbow import BUTTON, PEDESTAL, PRESSED, PushButtonElbow
 
 STEPS = 25  # control steps from one of the hand's places to the next
 
@@ -23,7 +25,7 @@ def hand_through(world: PushButtonElbow, *places: tuple[float, float, float]) ->
     targets = []
     for place in places:
         T[:3, 3] = place
-        ik = kinematics.solve(T, q, fixed={world.arm.redundant[-1]: q[0]})
+        ik = kinematics.solve(T, q, JointAngle(world.arm, (world.arm.redundant[-1],)), [q[0]])
         assert ik.status is Status.OK
         targets += [np.append(q + share * (ik.q - q), 0.0) for share in np.arange(1, STEPS + 1) / STEPS]
         q = ik.q

@@ -11,7 +11,7 @@ from er_il.datasets.record import Record, read_episodes, read_spec
 from er_il.datasets.recording import generate
 from er_il.envs.decoders import decoder
 from er_il.envs.tasks import task_id
-from er_il.envs.wrapper import make_decoding_env
+from er_il.envs.wrapper import make_action_space_env
 from er_il.evaluation.replay import find_datasets, replay, replay_demo, write_report
 from er_il.support.errors import DatasetError
 
@@ -52,7 +52,7 @@ def test_joint_and_erj_repeat_the_demo_and_task_space_loses_the_elbow(datasets, 
 def test_a_replay_plays_the_recorded_actions_not_the_leader_s(datasets):
     demo = read_episodes(datasets["joint"])[0]
     still = np.repeat(demo.leader[:1], len(demo.actions), axis=0)
-    world = make_decoding_env(task_id(RECIPE.task), decoder("joint"), **RECIPE.environment)
+    world = make_action_space_env(task_id(RECIPE.task), decoder("joint"), **RECIPE.environment)
     played = replay_demo(world, type(demo)(demo.seed, still, demo.leader, demo.state))
     world.close()
     assert not played.success

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from playing import play
 
-from er_il.spaces.action_space import make_action_space
-from sim_tasks.tasks.retrieve_bear import DISPLACED, LIFTED, RetrieveBear
+from er_il.spaces import make_action_space
+from sim_tasks.tasks.retrieve_bear import DISPLACED, RetrieveBear
 
 ASIDE = {
     "vase": (0.85, 0.29, 0.0),
@@ -45,12 +45,12 @@ def test_everything_stands_still_by_itself(world: RetrieveBear) -> None:
 def test_a_graze_is_forgiven_and_a_push_is_not(world: RetrieveBear, name: str) -> None:
     for shift, outcome in ((0.8 * DISPLACED, ""), (1.2 * DISPLACED, "clutter_displaced")):
         world.reset(seed=0)
-        world._data.joint(name).qpos[1] += shift
+        world.data.joint(name).qpos[1] += shift
         assert play(world, [still(world)] * 10) == outcome
     for degrees, outcome in ((5.0, ""), (30.0, "clutter_tipped")):
         world.reset(seed=0, options={"state": {name: (*world.places[name], 0.0)}})
         half = np.radians(degrees) / 2
-        world._data.joint(name).qpos[[2, 3, 4]] += [0.1, np.cos(half) - 1, np.sin(half)]  # clear of the top, leaning
+        world.data.joint(name).qpos[[2, 3, 4]] += [0.1, np.cos(half) - 1, np.sin(half)]  # clear of the top, leaning
         assert play(world, [still(world)]) == outcome
 
 
@@ -76,7 +76,7 @@ def test_a_demonstration_goes_on_beyond_success_and_a_bear_let_go_is_dropped(wor
     world.reset(seed=0)
     actions = list(world.leader(0))
     assert play(world, actions[:-5]) == "success"
-    assert world.object_pose("bear")[2] > world.sideboard.height + LIFTED
+    assert world.object_pose("bear")[2] > world.support + world.lift_height
     assert play(world, [np.append(actions[-1][:-1], 1.0)] * 20) == "dropped"
 
 

@@ -29,7 +29,7 @@ renderer = mujoco.Renderer(model, 8, 8)
 renderer.update_scene(mujoco.MjData(model))
 renderer.render()
 """
-_RENDER_AS_TASKS_DO = "import sim_tasks" + _RENDER
+_RENDER_AS_TASKS_DO = "import sim_tasks.world" + _RENDER
 _ROBOT = "import er_il; er_il.Arm.preset('panda')"
 _TORCHCODEC = "import torchcodec.decoders"
 _GPU = """

@@ -1,4 +1,4 @@
-"""Whether a configuration of the arm is clear of what stands around it."""
+"""Collision checks of the arm's postures."""
 
 from collections.abc import Mapping
 
@@ -24,12 +24,12 @@ class Collisions:
         self._robot_bodies = np.array(sorted(self._robot.bodies))
 
     def place(self, poses: Mapping[str, np.ndarray]) -> None:
-        """Put free bodies where they are now: name -> qpos (7,) of its free joint."""
+        """Set the poses of free bodies: name -> qpos (7,) of the free joint."""
         for name, qpos in poses.items():
             self._data.joint(name).qpos = qpos
 
     def is_free(self, q: Vector) -> bool:
-        """Whether the arm at q (n,) [rad], gripper open, clears the obstacles and itself."""
+        """True if the arm at q (n,) [rad], gripper open, touches neither the obstacles nor itself."""
         self._robot.place(self._data, q, 1.0)
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_comPos(self._model, self._data)

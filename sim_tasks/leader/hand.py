@@ -1,4 +1,4 @@
-"""Poses for the leader's hand."""
+"""Poses of the leader's hand."""
 
 import numpy as np
 

@@ -1,42 +1,74 @@
-"""The leader: a second, simulated arm without obstacles that follows a script with its servos."""
+"""The base of every scripted leader: planning with random draws, then playing the plan."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 
-import mujoco
 import numpy as np
 
-from er_il.arms.arm import Arm, Vector
-from sim_tasks.leader.motion import Stretch
-from sim_tasks.world.robot import RobotModel, robot_spec
+from er_il.support.errors import PlanError
+from sim_tasks.leader.arm import LeaderArm
+from sim_tasks.leader.motion import Segment
+from sim_tasks.tasks.arm_task import RATE, ArmTask
+from sim_tasks.world.randomisation import SLOWEST, interval, span
+
+DRAWS = 10  # random plans that are tried before the leader gives up
+
+_STREAM = 2  # separates the leader's random numbers from the world's, which are seeded with the seed itself
 
 
-class Leader:
-    """The arm that a person would hold; what it does is what the follower is told to do."""
+class Leader[Task: ArmTask](ABC):
+    """Demonstrates the episodes of one world. Subclasses write the script."""
 
-    def __init__(self, arm: Arm, period: float) -> None:
-        self._arm = arm
-        self._period = period
-        self._model = robot_spec(arm).compile()
-        self._robot = RobotModel.of(self._model, arm)
-        self._substeps = round(period / self._model.opt.timestep)
-
-    def perform(self, start: Vector, script: Sequence[Stretch], speed: float) -> Iterator[np.ndarray]:
-        """Play a script; yield the leader's joint angles [rad] and gripper opening (n+1,) each period.
+    def __init__(
+        self, world: Task, *, via_range: float = 0.01, speed_range: tuple[float, float] = (0.45, 0.55)
+    ) -> None:
+        """Prepare to demonstrate in ``world``.
 
         Args:
-            start: (n,) [rad] where the leader rests before.
-            script: The stretches, one after the other.
-            speed: Share of the joints' velocity limits that the fastest joint reaches.
+            world: The task's environment, whose state is read.
+            via_range: The first via point of the hand is displaced by up to this much [m] along each axis.
+            speed_range: Share of the joints' velocity limits.
+
+        Raises:
+            RandomisationError: a range is invalid.
         """
-        data = mujoco.MjData(self._model)
-        self._robot.place(data, start, script[0].gripper)
-        mujoco.mj_forward(self._model, data)
-        before = script[0].gripper
-        for stretch in script:
-            targets = stretch.sample(self._arm, self._period, speed)
-            for target, opening in zip(targets, stretch.openings(before, self._period, len(targets)), strict=True):
-                self._robot.command(data, target, opening)
-                mujoco.mj_step(self._model, data, nstep=self._substeps)
-                # The trigger's opening, not the fingers': what they hold is the follower's to find out.
-                yield np.append(data.qpos[self._robot.joint_qpos], opening)
-            before = stretch.gripper
+        self._via_range = span("via_range", via_range)
+        self._speed_range = interval("speed_range", speed_range, least=SLOWEST)
+        self._world = world
+        self._arm = LeaderArm(world.arm, 1 / RATE)
+
+    def demonstrate(self, seed: int) -> Iterator[np.ndarray]:
+        """Plan a demonstration of the episode just reset, and play it.
+
+        Yields the leader's joint angles [rad] and gripper opening, (n+1,) float64 each control period.
+
+        Raises:
+            PlanError: none of the random plans is feasible; known before the first yield.
+        """
+        script, speed = self._plan(np.random.default_rng([seed, _STREAM]))
+        return self._arm.perform(self._world.joint_positions, script, speed)
+
+    def _plan(self, rng: np.random.Generator) -> tuple[Sequence[Segment], float]:
+        """The first feasible script; the next one is written with the random numbers that follow."""
+        blocked = None
+        for _ in range(DRAWS):
+            try:
+                return self._script(rng)
+            except PlanError as error:
+                blocked = error
+        raise PlanError(f"None of {DRAWS} plans is feasible. The last: {blocked}")
+
+    @abstractmethod
+    def _script(self, rng: np.random.Generator) -> tuple[Sequence[Segment], float]:
+        """Plan the segments of a demonstration and the share of the velocity limits.
+
+        Raises:
+            PlanError: the plan is not feasible with these random numbers.
+        """
+
+    def _draw_via(self, rng: np.random.Generator) -> np.ndarray:
+        """Displacement (3,) [m] of the first via point."""
+        return rng.uniform(-self._via_range, self._via_range, 3)
+
+    def _draw_speed(self, rng: np.random.Generator) -> float:
+        return rng.uniform(*self._speed_range)

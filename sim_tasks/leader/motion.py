@@ -1,4 +1,4 @@
-"""From keyframes to a motion: collision-checked IK with a chosen elbow, then smooth timing."""
+"""Motion planning: keyframes to collision-checked joint paths with a chosen elbow, then smooth timing."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,34 +13,34 @@ from er_il.kinematics.redundancy import JointAngle
 from er_il.kinematics.solver import Status, kinematics_of
 from er_il.support.errors import PlanError
 
-STRAIGHT_STEP = 0.02  # [m] spacing of the waypoints of a straight stretch
+STRAIGHT_STEP = 0.02  # [m] spacing of the waypoints on a straight line
 CHECK_STEP = 0.05  # [rad] spacing of collision checks
-ELBOW_SEARCH = np.linspace(0.0, 0.6, 13)  # [rad] how far the elbow may leave its wish to be free
-GRID = 400  # points at which a motion's speed is measured
+ELBOW_SEARCH = np.linspace(0.0, 0.6, 13)  # [rad] deviations from the desired elbow angle that are tried
+GRID = 400  # points at which a path's speed is evaluated
 
 
 @dataclass(frozen=True)
 class Keyframe:
-    """A pose for the hand on the way, with the elbow that should take it there."""
+    """A pose of the hand along a path, with the desired elbow."""
 
     T_base_ee: np.ndarray  # (4, 4)
-    elbow: float | None  # [rad] wished angle of the arm's last redundant joint; None: that of the nearest posture
-    straight: bool = False  # the hand moves here on a straight line
+    elbow: float | None  # [rad] desired angle of the arm's last redundant joint; None: that of the nearest posture
+    straight: bool = False  # the hand moves to it on a straight line
     lean: float | None = None  # [rad] as elbow, for the redundant joints below that one, if the arm has any
 
 
 @dataclass(frozen=True)
-class Stretch:
-    """A motion between two stops, or the gripper's at one."""
+class Segment:
+    """A motion from rest to rest, of the arm or of the gripper alone."""
 
     waypoints: np.ndarray  # (K, n) [rad]
     gripper: float  # opening in [0, 1]
-    closing: float = 0.0  # [s] that the gripper takes to get there from where it was
+    closing: float = 0.0  # [s] duration of the gripper's motion from the opening before
     hold: float = 0.0  # [s] rest at the end, for the gripper to act
     pace: float = 1.0  # share of the script's speed
 
     def openings(self, before: float, period: float, steps: int) -> np.ndarray:
-        """Openings (steps,) of the gripper every ``period`` seconds, from the opening ``before`` the stretch."""
+        """Openings (steps,) of the gripper every ``period`` seconds, from the opening ``before`` the segment."""
         if not self.closing:
             return np.full(steps, self.gripper)
         times = np.arange(1, steps + 1) * period
@@ -66,45 +66,43 @@ def _ease(t: np.ndarray) -> np.ndarray:
 
 
 def solve_keyframe(arm: Arm, keyframe: Keyframe, seed: Vector, is_free: Callable[[Vector], bool]) -> Vector:
-    """Return joint angles (n,) that reach a keyframe free of collision, the elbow as near its wish as can be.
+    """Return collision-free joint angles (n,) [rad] at a keyframe, the elbow as near to the desired one as possible.
 
     Raises:
         PlanError: no elbow within the search range is reachable and free.
     """
-    wishes = _wishes(arm, keyframe, seed)
+    desired = _desired(arm, keyframe, seed)
     elbow = arm.redundant[-1]
     offsets = [sign * offset for offset in ELBOW_SEARCH for sign in (1, -1)]
     for offset in offsets:
-        fixed = wishes | {elbow: wishes[elbow] + offset}
+        fixed = desired | {elbow: desired[elbow] + offset}
         ik = kinematics_of(arm).solve(keyframe.T_base_ee, seed, *joint_angles(arm, fixed))
         if ik.status is Status.OK and is_free(ik.q):
             return ik.q
     x, y, z = keyframe.T_base_ee[:3, 3]
     raise PlanError(
-        f"No collision-free elbow near {wishes[elbow]:.2f} rad for the hand at ({x:.2f}, {y:.2f}, {z:.2f})."
+        f"No collision-free elbow near {desired[elbow]:.2f} rad for the hand at ({x:.2f}, {y:.2f}, {z:.2f})."
     )
 
 
-def _wishes(arm: Arm, keyframe: Keyframe, seed: Vector) -> dict[str, float]:
-    """Angles [rad] of all redundant joints: the keyframe's where it has a wish, else those of the nearest posture."""
+def _desired(arm: Arm, keyframe: Keyframe, seed: Vector) -> dict[str, float]:
+    """Desired angles [rad] of all redundant joints: the keyframe's where it has one, else the nearest posture's."""
     *below, elbow = arm.redundant
-    wishes = {} if keyframe.lean is None else dict.fromkeys(below, keyframe.lean)
+    desired = {} if keyframe.lean is None else dict.fromkeys(below, keyframe.lean)
     if keyframe.elbow is not None:
-        wishes[elbow] = keyframe.elbow
-    if left := [joint for joint in arm.redundant if joint not in wishes]:
-        nearest = kinematics_of(arm).solve(keyframe.T_base_ee, seed, *joint_angles(arm, wishes)).q
-        # Free joints differ in the last bits from process to process; a rounded wish leads all to the same plan.
-        wishes |= {joint: round(float(nearest[arm.joints.index(joint)]), 4) for joint in left}
-    return wishes
+        desired[elbow] = keyframe.elbow
+    if left := [joint for joint in arm.redundant if joint not in desired]:
+        nearest = kinematics_of(arm).solve(keyframe.T_base_ee, seed, *joint_angles(arm, desired)).q
+        # Free joints differ in the last bits from process to process; rounding leads all to the same plan.
+        desired |= {joint: round(float(nearest[arm.joints.index(joint)]), 4) for joint in left}
+    return desired
 
 
-def plan_stretch(
-    arm: Arm, start: Vector, keyframes: Sequence[Keyframe], is_free: Callable[[Vector], bool]
-) -> np.ndarray:
-    """Return waypoints (K, n) from a start through keyframes, checked for collision all along.
+def plan_path(arm: Arm, start: Vector, keyframes: Sequence[Keyframe], is_free: Callable[[Vector], bool]) -> np.ndarray:
+    """Return waypoints (K, n) [rad] from a start (n,) through keyframes, checked for collision along the path.
 
     Raises:
-        PlanError: a keyframe cannot be reached, or the way to it is blocked.
+        PlanError: a keyframe cannot be reached, or the path to it is blocked.
     """
     waypoints = [np.asarray(start)]
     for keyframe in keyframes:
@@ -115,7 +113,7 @@ def plan_stretch(
     for one, other in pairwise(path):
         for t in np.linspace(0, 1, max(2, int(np.max(np.abs(other - one)) / CHECK_STEP) + 1)):
             if not is_free((1 - t) * one + t * other):
-                raise PlanError("The way between two keyframes is blocked.")
+                raise PlanError("The path between two keyframes is blocked.")
     return path
 
 

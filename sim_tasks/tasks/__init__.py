@@ -1,1 +1,3 @@
-"""Tasks: what each builds, places, judges and rewards."""
+"""Tasks: each builds its world, places objects, judges episodes and gives rewards."""
+
+import sim_tasks.world  # noqa: F401  chooses the GL backend before MuJoCo is imported

@@ -8,50 +8,49 @@ from typing import Any, ClassVar
 import gymnasium as gym
 import mujoco
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from er_il.arms.arm import Arm, Vector
-from er_il.kinematics.rotation import Quaternion, make_rotation
 from er_il.kinematics.solver import kinematics_of
 from er_il.support.errors import UnknownNameError
-from er_il.support.shapes import POSE_NAMES, Shape
-from sim_tasks.leader.leader import Leader
-from sim_tasks.leader.motion import Stretch
+from er_il.support.shapes import Shape
+from sim_tasks.tasks.observation import Observer, object_pose
+from sim_tasks.tasks.registration import Demonstrator, leader_class, registration
+from sim_tasks.tasks.rewards import Reward, total
 from sim_tasks.world.camera import Cameras
 from sim_tasks.world.contact import contact_force
 from sim_tasks.world.geometry import world_shapes
 from sim_tasks.world.randomisation import span
-from sim_tasks.world.robot import FINGER_BODIES, RobotModel, lift
+from sim_tasks.world.robot import FINGER_BODIES, RobotModel, shoulder_offset
 from sim_tasks.world.scene import scene_spec
 
 RATE = 20  # [Hz] of control
 COLLISION_FORCE = 20.0  # [N] at which a Panda's collision reflex stops it, by its makers' default
 SUCCESS_STEPS = 5  # consecutive control steps (0.25 s) for which success must hold
 
-_LEADER = 2  # tells the leader's random numbers from the world's, which start from the seed itself
-
 Placement = dict[str, tuple[float, float, float]]  # object: x, y [m], yaw [rad]
 
 
 class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
-    """A task for one arm. Subclasses build the world, place its objects, judge and demonstrate.
+    """A task for one arm. Subclasses build the world, place its objects, judge episodes and give rewards.
 
     Action: Box(n+1,): joint position targets [rad] and the gripper's opening in [0, 1] (1 open).
     Observation: ``agent_pos`` (n+8,): joint positions [rad], gripper opening, end-effector position
     [m] and quaternion (x, y, z, w); ``environment_state``: position [m] and quaternion (x, y, z, w)
     of each object; ``pixels``: a (size, size, 3) uint8 image a camera, if cameras are asked for.
-    Every ``info`` has ``is_success`` and ``failure`` (empty while there is none).
+    Reward: the sum, in [0, 1], of the terms in ``info["reward_terms"]``; 1 if the goal holds.
+    Every ``info`` has ``is_success`` and ``failure`` (empty while there is none) besides. Success and failure
+    terminate an episode; at the step limit it is truncated, and ``failure`` names what was missing.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": RATE}  # pyright: ignore[reportIncompatibleVariableOverride]
 
-    task: ClassVar[str]
+    task: ClassVar[str]  # name under which the class is registered
     task_description: ClassVar[str]
-    max_steps: ClassVar[int]
     objects: ClassVar[tuple[str, ...]]  # bodies that move, in the order of environment_state
     obstacles: ClassVar[tuple[str, ...]]  # bodies that the robot must not run into
     arms: ClassVar[tuple[str, ...]] = ("panda",)  # presets that can do the task
-    start: ClassVar[tuple[float, ...]]  # (7,) [rad] of the last seven joints; what is below them starts at home
+    start: ClassVar[tuple[float, ...]]  # (7,) [rad] of the last seven joints; the joints below them start at home
+    reward: ClassVar[Reward]
 
     def __init__(
         self,
@@ -61,6 +60,7 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
         render_mode: str | None = None,
         arm: str = "panda",
         start_range: float = 0.02,
+        **leader_settings: Any,
     ) -> None:
         """Build the world.
 
@@ -70,93 +70,100 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
             render_mode: ``rgb_array`` for :meth:`render`.
             arm: Preset of the follower and the leader, one of the task's ``arms``.
             start_range: Each of the last seven joints starts up to this far [rad] from the start posture.
+            leader_settings: Keyword arguments of the task's leader.
+
+        Raises:
+            UnknownNameError: no such camera, render mode, or arm for this task.
+            RandomisationError: a range is invalid.
         """
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise UnknownNameError("render mode", render_mode, self.metadata["render_modes"])
         if arm not in self.arms:
             raise UnknownNameError(f"arm for {self.task}", arm, self.arms)
         self.arm = Arm.preset(arm)
-        # Tasks are measured from a Panda's shoulder: what stands before an arm that is taller stands higher, too.
-        self.lift = lift(self.arm)
+        # Tasks are measured from a Panda's shoulder: objects before an arm that is taller stand higher, too.
+        self.shoulder_offset = shoulder_offset(self.arm)
+        self.max_steps = registration(self.task).max_steps
         self.render_mode = render_mode
         self._start_range = span("start_range", start_range)
-        self._model = self._spec().compile()
-        self._data = mujoco.MjData(self._model)
-        self._robot = RobotModel.of(self._model, self.arm)
-        self._fingers = {self._model.body(name).id for name in FINGER_BODIES}
-        self._obstacles = {self._model.body(name).id for name in self.obstacles}
-        self._substeps = round(1 / RATE / self._model.opt.timestep)
-        self._cameras = Cameras(self._model, cameras, image_size)
-        self._rotation = make_rotation(Quaternion.kind, kinematics_of(self.arm).fk(self.arm.home)[:3, :3])
-        self._quaternion = np.zeros(4)
+        self.model = self.world_spec().compile()
+        self.data = mujoco.MjData(self.model)
+        self.robot = RobotModel.of(self.model, self.arm)
+        self._fingers = [{self.model.body(name).id} for name in FINGER_BODIES]
+        self._obstacles = {self.model.body(name).id for name in self.obstacles}
+        self._substeps = round(1 / RATE / self.model.opt.timestep)
+        self._cameras = Cameras(self.model, cameras, image_size)
+        self._observer = Observer(self.arm, self.robot, self.objects, self._cameras)
         self._steps = self._success_steps = 0
         lower, upper = np.append(self.arm.lower, 0.0), np.append(self.arm.upper, 1.0)
         self.action_space = gym.spaces.Box(lower.astype(np.float32), upper.astype(np.float32))
-        self.observation_space = self._make_observation_space(image_size)
+        self.observation_space = self._observer.space()
+        self._leader_settings = leader_settings
+        if leader_settings:
+            self._leader  # noqa: B018  wrong settings are refused now, not at the first demonstration
 
-    def _spec(self) -> mujoco.MjSpec:
-        """The whole world: robot and bench with the task's things."""
+    def world_spec(self) -> mujoco.MjSpec:
+        """The whole world: robot and bench with the task's objects."""
         spec = scene_spec(self.arm)
         self._build(spec)
         return spec
 
     @abstractmethod
     def _build(self, spec: mujoco.MjSpec) -> None:
-        """Add the task's things to the scene."""
+        """Add the task's furniture and objects to the scene."""
 
     @abstractmethod
     def _draw(self, rng: np.random.Generator) -> Placement:
-        """Draw where the objects stand."""
+        """Draw a random placement of the objects."""
 
     @abstractmethod
     def _place(self, placement: Placement) -> None:
-        """Put the objects where a placement says."""
+        """Put the objects at a placement; forget the last episode."""
 
     @abstractmethod
     def _succeeds(self) -> bool:
-        """Whether the goal holds at this moment."""
+        """True if the goal holds in this state."""
 
     @abstractmethod
     def _fails(self) -> str:
-        """Name of what went wrong beyond repair, empty if nothing did."""
+        """Name of a failure beyond repair, empty if there is none."""
 
     def _collision(self) -> str:
-        """Name of running into an obstacle at this moment."""
+        """Name of the failure if the robot collides with an obstacle in this state."""
         return "collision"
 
     @abstractmethod
     def _times_out(self) -> str:
-        """Name of what was missing when the time ran out."""
+        """Name of what is missing if the step limit is reached in this state."""
 
     @abstractmethod
-    def _script(self, rng: np.random.Generator) -> tuple[Sequence[Stretch], float]:
-        """Plan the demonstration of the episode just reset: the stretches, and the speed share."""
+    def _progress(self) -> dict[str, float]:
+        """Progress in [0, 1] of each stage of ``reward`` but success, a function of the state; 1 once complete."""
 
     @property
     def state_names(self) -> tuple[str, ...]:
         """Names of ``agent_pos``."""
-        pose = ("ee.x", "ee.y", "ee.z", *Quaternion.names)
-        return (*(f"{joint}.pos" for joint in self.arm.joints), "gripper", *pose)
+        return self._observer.state_names
 
     @property
     def environment_state_names(self) -> tuple[str, ...]:
         """Names of ``environment_state``."""
-        return tuple(f"{name}.{part}" for name in self.objects for part in POSE_NAMES)
+        return self._observer.environment_state_names
 
     @property
-    def _nominal_start(self) -> Vector:
+    def nominal_start(self) -> Vector:
         """Joint angles (n,) [rad] around which episodes start."""
         return np.append(self.arm.home[: self.arm.dof - len(self.start)], self.start)
 
     @property
     def joint_positions(self) -> Vector:
         """The follower's true joint angles (n,) [rad]."""
-        return self._data.qpos[self._robot.joint_qpos].copy()
+        return self.robot.joint_positions(self.data)
 
     @property
     def gripper_opening(self) -> float:
         """The gripper's true opening in [0, 1]."""
-        return self._robot.opening(self._data)
+        return self.robot.opening(self.data)
 
     @property
     def ee_pose(self) -> np.ndarray:
@@ -164,55 +171,55 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
         return kinematics_of(self.arm).fk(self.joint_positions)
 
     def object_pose(self, name: str) -> np.ndarray:
-        """An object's position [m] and quaternion (x, y, z, w), (7,)."""
-        body = self._data.body(name)
-        return np.concatenate([body.xpos, body.xquat[[1, 2, 3, 0]]])
+        """An object's position [m] and quaternion (x, y, z, w) in the base frame, (7,)."""
+        return object_pose(self.data, name)
 
     def scene_geometry(self) -> list[Shape]:
         """The world around the robot as shapes to draw, as of the last reset."""
-        return world_shapes(self._model, self._data, self._robot.bodies, self.objects)
+        return world_shapes(self.model, self.data, self.robot.bodies, self.objects)
 
     def reset(
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Start an episode. ``options={"state": {name: (x, y, yaw)}}`` places objects by hand."""
         super().reset(seed=seed)
-        start = self._nominal_start
+        start = self.nominal_start
         start[-len(self.start) :] += self.np_random.uniform(-self._start_range, self._start_range, len(self.start))
         placement = self._draw(self.np_random)
         chosen = (options or {}).get("state", {})
-        for name, where in chosen.items():
+        for name, pose in chosen.items():
             if name not in placement:
                 raise UnknownNameError("object", name, placement)
-            x, y, yaw = where
+            x, y, yaw = pose
             placement[name] = (float(x), float(y), float(yaw))
-        mujoco.mj_resetData(self._model, self._data)
-        self._robot.place(self._data, start, 1.0)
+        mujoco.mj_resetData(self.model, self.data)
+        self.robot.place(self.data, start, 1.0)
         self._place(placement)
-        mujoco.mj_forward(self._model, self._data)
+        mujoco.mj_forward(self.model, self.data)
         self._steps = self._success_steps = 0
-        self._quaternion = self._rotation.encode(self.ee_pose[None, :3, :3])[0]
-        return self._observe(), {"is_success": False, "failure": ""}
+        terms = self.reward.terms(self._progress(), success=False)
+        return self._observer.reset(self.data), {"is_success": False, "failure": "", "reward_terms": terms}
 
     def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Servo towards joint targets for one control period."""
         command = np.clip(np.asarray(action, dtype=np.float64), self.action_space.low, self.action_space.high)
-        self._robot.command(self._data, command[:-1], command[-1])
-        mujoco.mj_step(self._model, self._data, nstep=self._substeps)
-        mujoco.mj_forward(self._model, self._data)  # poses and contacts at the new positions
+        self.robot.command(self.data, command[:-1], command[-1])
+        mujoco.mj_step(self.model, self.data, nstep=self._substeps)
+        mujoco.mj_forward(self.model, self.data)  # poses and contacts at the new positions
         self._steps += 1
         failure = self._fails()
-        if (
-            not failure
-            and contact_force(self._model, self._data, self._robot.bodies, self._obstacles) > COLLISION_FORCE
-        ):
+        if not failure and contact_force(self.model, self.data, self.robot.bodies, self._obstacles) > COLLISION_FORCE:
             failure = self._collision()
-        self._success_steps = self._success_steps + 1 if not failure and self._succeeds() else 0
+        goal = not failure and self._succeeds()
+        self._success_steps = self._success_steps + 1 if goal else 0
         success = self._success_steps >= SUCCESS_STEPS
-        done = success or bool(failure)
-        if not done and self._steps >= self.max_steps:
+        terminated = success or bool(failure)
+        truncated = not terminated and self._steps >= self.max_steps
+        if truncated:
             failure = self._times_out()
-        return self._observe(), float(success), done, False, {"is_success": success, "failure": failure}
+        terms = self.reward.terms(self._progress(), goal)
+        info = {"is_success": success, "failure": failure, "reward_terms": terms}
+        return self._observer.observe(self.data), total(terms), terminated, truncated, info
 
     def leader(self, seed: int) -> Iterator[np.ndarray]:
         """Demonstrate the episode just reset.
@@ -221,46 +228,19 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
         period: the action to record and to step with.
 
         Raises:
-            er_il.support.errors.PlanError: no collision-free motion exists; known before the first yield.
+            sim_tasks.tasks.registration.NoLeaderError: the task has none.
+            er_il.support.errors.PlanError: no collision-free motion was found; known before the first yield.
         """
-        script, speed = self._script(np.random.default_rng([seed, _LEADER]))
-        return self._leader_arm.perform(self.joint_positions, script, speed)
+        return self._leader.demonstrate(seed)
 
     @cached_property
-    def _leader_arm(self) -> Leader:
-        return Leader(self.arm, 1 / RATE)
+    def _leader(self) -> Demonstrator:
+        return leader_class(self.task)(self, **self._leader_settings)
 
     def render(self) -> np.ndarray | None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """A picture (H, W, 3) uint8 of the scene for people."""
-        return self._cameras.picture(self._data) if self.render_mode == "rgb_array" else None
+        return self._cameras.picture(self.data) if self.render_mode == "rgb_array" else None
 
     def close(self) -> None:
         """Free the rendering contexts."""
         self._cameras.close()
-
-    def _observe(self) -> dict[str, Any]:
-        T_base_ee = self.ee_pose
-        # The quaternion keeps the sign of the step before: no jump in what a policy reads.
-        quaternion = Rotation.from_matrix(T_base_ee[:3, :3]).as_quat()
-        self._quaternion = quaternion if quaternion @ self._quaternion >= 0 else -quaternion
-        agent = [self.joint_positions, [self.gripper_opening], T_base_ee[:3, 3], self._quaternion]
-        observation: dict[str, Any] = {
-            "agent_pos": np.concatenate(agent).astype(np.float32),
-            "environment_state": np.concatenate([self.object_pose(name) for name in self.objects]).astype(np.float32),
-        }
-        if self._cameras.names:
-            observation["pixels"] = self._cameras.images(self._data)
-        return observation
-
-    def _make_observation_space(self, image_size: int) -> gym.spaces.Dict:
-        def unbounded(size: int) -> gym.spaces.Box:
-            return gym.spaces.Box(-np.inf, np.inf, (size,), np.float32)
-
-        spaces: dict[str, gym.Space[Any]] = {
-            "agent_pos": unbounded(len(self.state_names)),
-            "environment_state": unbounded(len(self.environment_state_names)),
-        }
-        if self._cameras.names:
-            image = gym.spaces.Box(0, 255, (image_size, image_size, 3), np.uint8)
-            spaces["pixels"] = gym.spaces.Dict(dict.fromkeys(self._cameras.names, image))
-        return gym.spaces.Dict(spaces)

@@ -9,11 +9,8 @@ class ReachRemoveCup(RemoveCup):
 
     task = "reach_remove_cup"
     task_description = "Reach into the cabinet, grasp the cup by its stem and take it out, upright."
-    max_steps = 300
     arms = ("panda",)
     start = ReachCup.start
-    way = ReachCup.way
-    pace = ReachCup.pace
 
     def _collision(self) -> str:
         return "collision_removing" if self._was_freed else "collision_reaching"

@@ -1,4 +1,4 @@
-"""Cameras: where they look, and rendering them fast for policies or well for people."""
+"""Cameras: mounting poses, fast rendering for policies and high-quality rendering for people."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,13 +25,13 @@ class View:
     fovy: float  # [deg]
     up: tuple[float, float, float] = UP
 
-    def add(self, spec: mujoco.MjSpec, lift: float) -> None:
-        """Add the camera to a spec; one that stands in the world stands ``lift`` [m] higher."""
+    def add(self, spec: mujoco.MjSpec, shoulder_offset: float) -> None:
+        """Add the camera to a spec; one that stands in the world stands ``shoulder_offset`` [m] higher."""
         back = np.subtract(self.position, self.target)  # a MuJoCo camera looks along its own -z
         right = np.cross(self.up, back)
         axes = np.column_stack([right, np.cross(back, right), back])
         x, y, z, w = Rotation.from_matrix(axes / np.linalg.norm(axes, axis=0)).as_quat()
-        position = np.add(self.position, (0.0, 0.0, lift if self.body == "world" else 0.0))
+        position = np.add(self.position, (0.0, 0.0, shoulder_offset if self.body == "world" else 0.0))
         spec.body(self.body).add_camera(name=self.name, pos=position, quat=(w, x, y, z), fovy=self.fovy)
 
 
@@ -60,14 +60,14 @@ class Cameras:
             raise ErIlError(f"Image size {size} is not between 1 and {LARGEST_PICTURE} px.")
         self.names = tuple(names)
         self._model = model
-        self._size = size
+        self.size = size
         self._policy: mujoco.Renderer | None = None
         self._people: mujoco.Renderer | None = None
 
     def images(self, data: mujoco.MjData) -> dict[str, np.ndarray]:
         """Images (size, size, 3) uint8 for a policy: no shadows, which cost ten times the picture."""
         if self._policy is None:
-            self._policy = _renderer(self._model, self._size, self._size, samples=0)
+            self._policy = _renderer(self._model, self.size, self.size, samples=0)
         images = {}
         for name in self.names:
             self._policy.update_scene(data, camera=name)

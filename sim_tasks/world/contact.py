@@ -1,13 +1,16 @@
-"""Questions about contacts between groups of bodies."""
+"""Contacts between groups of bodies."""
 
 from collections.abc import Collection, Iterator
+from itertools import product
 
 import mujoco
 import numpy as np
 
+FAR = 10.0  # [m] up to which distances are measured
+
 
 def touching(model: mujoco.MjModel, data: mujoco.MjData, one: Collection[int], other: Collection[int]) -> bool:
-    """Whether any body of one group touches any body of the other."""
+    """True if any body of one group touches any body of the other."""
     return next(_between(model, data, one, other), None) is not None
 
 
@@ -18,6 +21,17 @@ def contact_force(model: mujoco.MjModel, data: mujoco.MjData, one: Collection[in
         mujoco.mj_contactForce(model, data, index, force)
         total += float(np.linalg.norm(force[:3]))
     return total
+
+
+def collision_geoms(model: mujoco.MjModel, bodies: Collection[int]) -> tuple[int, ...]:
+    """Ids of the collision shapes of a group of bodies."""
+    collides = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
+    return tuple(np.flatnonzero(collides & np.isin(model.geom_bodyid, list(bodies))).tolist())
+
+
+def distance(model: mujoco.MjModel, data: mujoco.MjData, one: Collection[int], other: Collection[int]) -> float:
+    """Smallest distance [m] between two groups of shapes, at most FAR, negative if they overlap."""
+    return min(mujoco.mj_geomDistance(model, data, a, b, FAR, None) for a, b in product(one, other))
 
 
 def _between(model: mujoco.MjModel, data: mujoco.MjData, one: Collection[int], other: Collection[int]) -> Iterator[int]:

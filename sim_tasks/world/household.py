@@ -1,7 +1,7 @@
-"""Free things that stand about in a home, each recognisable by its looks and simple in its touch.
+"""Free household objects with detailed visual and simple collision shapes.
 
-What is seen does not collide; hidden boxes and cylinders of about the same size do. Frames: the origin is the
-middle of the underside, z up; what has a face looks along -x, at the robot.
+Visual shapes do not collide; hidden boxes and cylinders of about the same size do. Frames: the origin is the
+middle of the underside, z up; an object with a face looks along -x, at the robot.
 """
 
 from collections.abc import Sequence
@@ -25,8 +25,8 @@ YELLOW, PINK, OCHRE = (0.95, 0.78, 0.22, 1.0), (0.90, 0.55, 0.62, 1.0), (0.80, 0
 
 
 @dataclass(frozen=True)
-class Part:
-    """One shape of a thing, in the thing's frame."""
+class Primitive:
+    """One primitive shape of a thing, in the thing's frame."""
 
     kind: int  # MuJoCo's geom type
     size: Triple  # [m] half extents, or radius and half height
@@ -37,33 +37,35 @@ class Part:
 
 @dataclass(frozen=True)
 class Thing:
-    """A free body: what is seen of it, and what can be touched."""
+    """A free body made of visual and collision primitives."""
 
     mass: float  # [kg]
-    looks: tuple[Part, ...]
-    touch: tuple[tuple[Part, float], ...]  # each with its share of the mass
+    looks: tuple[Primitive, ...]  # visual only
+    touch: tuple[tuple[Primitive, float], ...]  # collision only, each with its share of the mass
 
     def add(self, spec: mujoco.MjSpec, name: str, position: Sequence[float]) -> mujoco.MjsBody:
         """Add the thing with a free joint of its name."""
         body = spec.worldbody.add_body(name=name, pos=position)
         body.add_freejoint(name=name)
-        for part in self.looks:
-            _geom(body, part, mass=0, contype=0, conaffinity=0, group=2)
-        for part, share in self.touch:
-            _geom(body, part, mass=share * self.mass, friction=(1.0, 0.02, 0.0005), condim=4, group=3)
+        for primitive in self.looks:
+            _geom(body, primitive, mass=0, contype=0, conaffinity=0, group=2)
+        for primitive, share in self.touch:
+            _geom(body, primitive, mass=share * self.mass, friction=(1.0, 0.02, 0.0005), condim=4, group=3)
         return body
 
 
-def _geom(body: mujoco.MjsBody, part: Part, **kwargs: object) -> None:
-    geom = body.add_geom(type=part.kind, size=part.size, pos=part.centre, rgba=part.rgba, **kwargs)
-    geom.alt.euler = part.turn
+def _geom(body: mujoco.MjsBody, primitive: Primitive, **kwargs: object) -> None:
+    geom = body.add_geom(type=primitive.kind, size=primitive.size, pos=primitive.centre, rgba=primitive.rgba, **kwargs)
+    geom.alt.euler = primitive.turn
 
 
-def _pair(kind: int, size: Triple, centre: Triple, rgba: Rgba, turn: Triple = (0.0, 0.0, 0.0)) -> tuple[Part, Part]:
+def _pair(
+    kind: int, size: Triple, centre: Triple, rgba: Rgba, turn: Triple = (0.0, 0.0, 0.0)
+) -> tuple[Primitive, Primitive]:
     """Two shapes, left and right of the middle."""
     x, y, z = centre
     a, b, c = turn
-    return Part(kind, size, (x, y, z), rgba, (a, b, c)), Part(kind, size, (x, -y, z), rgba, (-a, b, -c))
+    return Primitive(kind, size, (x, y, z), rgba, (a, b, c)), Primitive(kind, size, (x, -y, z), rgba, (-a, b, -c))
 
 
 HEAD_HEIGHT = 0.128  # [m] of the middle of the bear's head, where fingers find it
@@ -71,96 +73,96 @@ HEAD_HEIGHT = 0.128  # [m] of the middle of the bear's head, where fingers find 
 BEAR = Thing(
     mass=0.15,
     looks=(
-        Part(ELLIPSOID, (0.036, 0.038, 0.050), (0.0, 0.0, 0.050), FUR),  # torso
-        Part(ELLIPSOID, (0.022, 0.027, 0.034), (-0.019, 0.0, 0.048), PALE_FUR),  # belly
-        Part(ELLIPSOID, (0.031, 0.031, 0.031), (0.0, 0.0, HEAD_HEIGHT), FUR),
-        Part(ELLIPSOID, (0.015, 0.017, 0.013), (-0.026, 0.0, HEAD_HEIGHT - 0.008), PALE_FUR),  # snout
-        Part(ELLIPSOID, (0.005, 0.007, 0.005), (-0.040, 0.0, HEAD_HEIGHT - 0.003), BLACK),  # nose
+        Primitive(ELLIPSOID, (0.036, 0.038, 0.050), (0.0, 0.0, 0.050), FUR),  # torso
+        Primitive(ELLIPSOID, (0.022, 0.027, 0.034), (-0.019, 0.0, 0.048), PALE_FUR),  # belly
+        Primitive(ELLIPSOID, (0.031, 0.031, 0.031), (0.0, 0.0, HEAD_HEIGHT), FUR),
+        Primitive(ELLIPSOID, (0.015, 0.017, 0.013), (-0.026, 0.0, HEAD_HEIGHT - 0.008), PALE_FUR),  # snout
+        Primitive(ELLIPSOID, (0.005, 0.007, 0.005), (-0.040, 0.0, HEAD_HEIGHT - 0.003), BLACK),  # nose
         *_pair(ELLIPSOID, (0.004, 0.005, 0.005), (-0.027, 0.012, HEAD_HEIGHT + 0.010), BLACK),  # eyes
         *_pair(ELLIPSOID, (0.007, 0.013, 0.013), (0.004, 0.024, HEAD_HEIGHT + 0.027), FUR),  # ears
         *_pair(ELLIPSOID, (0.004, 0.008, 0.008), (-0.002, 0.024, HEAD_HEIGHT + 0.027), PALE_FUR),
         *_pair(ELLIPSOID, (0.015, 0.015, 0.034), (-0.018, 0.040, 0.066), FUR, (20.0, 40.0, 0.0)),  # arms
         *_pair(ELLIPSOID, (0.036, 0.018, 0.018), (-0.034, 0.028, 0.018), FUR, (0.0, 0.0, -15.0)),  # legs
         *_pair(ELLIPSOID, (0.006, 0.013, 0.013), (-0.066, 0.037, 0.020), PALE_FUR, (0.0, 0.0, -15.0)),  # soles
-        Part(CYLINDER, (0.024, 0.004, 0.0), (0.0, 0.0, 0.098), RED),  # a ribbon round the neck
+        Primitive(CYLINDER, (0.024, 0.004, 0.0), (0.0, 0.0, 0.098), RED),  # a ribbon round the neck
         *_pair(ELLIPSOID, (0.006, 0.011, 0.008), (-0.027, 0.011, 0.097), RED, (25.0, 0.0, 0.0)),
     ),
     touch=(
         # Upright, so that the fingers find it alike from every side.
-        (Part(CYLINDER, (0.030, 0.028, 0.0), (0.0, 0.0, HEAD_HEIGHT)), 0.2),
-        (Part(CYLINDER, (0.034, 0.045, 0.0), (0.0, 0.0, 0.055)), 0.4),
-        (Part(BOX, (0.050, 0.044, 0.015), (-0.018, 0.0, 0.015)), 0.4),
+        (Primitive(CYLINDER, (0.030, 0.028, 0.0), (0.0, 0.0, HEAD_HEIGHT)), 0.2),
+        (Primitive(CYLINDER, (0.034, 0.045, 0.0), (0.0, 0.0, 0.055)), 0.4),
+        (Primitive(BOX, (0.050, 0.044, 0.015), (-0.018, 0.0, 0.015)), 0.4),
     ),
 )
 
 CACTUS = Thing(
     mass=1.2,
     looks=(
-        Part(CYLINDER, (0.042, 0.030, 0.0), (0.0, 0.0, 0.030), TERRACOTTA),
-        Part(CYLINDER, (0.048, 0.010, 0.0), (0.0, 0.0, 0.065), TERRACOTTA),  # the pot's rim
-        Part(CYLINDER, (0.041, 0.002, 0.0), (0.0, 0.0, 0.075), SOIL),
-        Part(CAPSULE, (0.028, 0.100, 0.0), (0.0, 0.0, 0.190), LEAF),
-        Part(CAPSULE, (0.013, 0.016, 0.0), (0.0, 0.038, 0.165), LEAF, (90.0, 0.0, 0.0)),
-        Part(CAPSULE, (0.013, 0.030, 0.0), (0.0, 0.054, 0.195), LEAF),
-        Part(CAPSULE, (0.013, 0.012, 0.0), (0.0, -0.036, 0.205), LEAF, (90.0, 0.0, 0.0)),
-        Part(CAPSULE, (0.013, 0.025, 0.0), (0.0, -0.050, 0.230), LEAF),
-        Part(ELLIPSOID, (0.016, 0.016, 0.010), (0.0, 0.0, 0.320), PINK),
+        Primitive(CYLINDER, (0.042, 0.030, 0.0), (0.0, 0.0, 0.030), TERRACOTTA),
+        Primitive(CYLINDER, (0.048, 0.010, 0.0), (0.0, 0.0, 0.065), TERRACOTTA),  # the pot's rim
+        Primitive(CYLINDER, (0.041, 0.002, 0.0), (0.0, 0.0, 0.075), SOIL),
+        Primitive(CAPSULE, (0.028, 0.100, 0.0), (0.0, 0.0, 0.190), LEAF),
+        Primitive(CAPSULE, (0.013, 0.016, 0.0), (0.0, 0.038, 0.165), LEAF, (90.0, 0.0, 0.0)),
+        Primitive(CAPSULE, (0.013, 0.030, 0.0), (0.0, 0.054, 0.195), LEAF),
+        Primitive(CAPSULE, (0.013, 0.012, 0.0), (0.0, -0.036, 0.205), LEAF, (90.0, 0.0, 0.0)),
+        Primitive(CAPSULE, (0.013, 0.025, 0.0), (0.0, -0.050, 0.230), LEAF),
+        Primitive(ELLIPSOID, (0.016, 0.016, 0.010), (0.0, 0.0, 0.320), PINK),
     ),
     touch=(
-        (Part(CYLINDER, (0.048, 0.038, 0.0), (0.0, 0.0, 0.038)), 0.8),
-        (Part(CYLINDER, (0.030, 0.123, 0.0), (0.0, 0.0, 0.199)), 0.1),
-        (Part(BOX, (0.013, 0.065, 0.050), (0.0, 0.0, 0.205)), 0.1),  # the arms
+        (Primitive(CYLINDER, (0.048, 0.038, 0.0), (0.0, 0.0, 0.038)), 0.8),
+        (Primitive(CYLINDER, (0.030, 0.123, 0.0), (0.0, 0.0, 0.199)), 0.1),
+        (Primitive(BOX, (0.013, 0.065, 0.050), (0.0, 0.0, 0.205)), 0.1),  # the arms
     ),
 )
 
 VASE = Thing(
     mass=0.9,
     looks=(
-        Part(CYLINDER, (0.032, 0.010, 0.0), (0.0, 0.0, 0.010), BLUE),
-        Part(ELLIPSOID, (0.048, 0.048, 0.080), (0.0, 0.0, 0.085), BLUE),
-        Part(CYLINDER, (0.022, 0.030, 0.0), (0.0, 0.0, 0.165), BLUE),
-        Part(CYLINDER, (0.030, 0.005, 0.0), (0.0, 0.0, 0.197), CREAM),
+        Primitive(CYLINDER, (0.032, 0.010, 0.0), (0.0, 0.0, 0.010), BLUE),
+        Primitive(ELLIPSOID, (0.048, 0.048, 0.080), (0.0, 0.0, 0.085), BLUE),
+        Primitive(CYLINDER, (0.022, 0.030, 0.0), (0.0, 0.0, 0.165), BLUE),
+        Primitive(CYLINDER, (0.030, 0.005, 0.0), (0.0, 0.0, 0.197), CREAM),
         *_pair(CYLINDER, (0.003, 0.045, 0.0), (0.0, 0.012, 0.235), LEAF, (-14.0, 0.0, 0.0)),
-        Part(CYLINDER, (0.003, 0.050, 0.0), (0.0, 0.0, 0.245), LEAF),
+        Primitive(CYLINDER, (0.003, 0.050, 0.0), (0.0, 0.0, 0.245), LEAF),
         *_pair(ELLIPSOID, (0.022, 0.022, 0.018), (0.0, 0.026, 0.275), PINK),
         *_pair(ELLIPSOID, (0.009, 0.009, 0.022), (0.0, 0.026, 0.275), YELLOW),
-        Part(ELLIPSOID, (0.022, 0.022, 0.018), (0.0, 0.0, 0.305), YELLOW),
-        Part(ELLIPSOID, (0.009, 0.009, 0.022), (0.0, 0.0, 0.305), OCHRE),
+        Primitive(ELLIPSOID, (0.022, 0.022, 0.018), (0.0, 0.0, 0.305), YELLOW),
+        Primitive(ELLIPSOID, (0.009, 0.009, 0.022), (0.0, 0.0, 0.305), OCHRE),
     ),
     touch=(
-        (Part(CYLINDER, (0.045, 0.075, 0.0), (0.0, 0.0, 0.075)), 0.8),
-        (Part(CYLINDER, (0.030, 0.025, 0.0), (0.0, 0.0, 0.175)), 0.1),
-        (Part(CYLINDER, (0.045, 0.060, 0.0), (0.0, 0.0, 0.260)), 0.1),  # the flowers
+        (Primitive(CYLINDER, (0.045, 0.075, 0.0), (0.0, 0.0, 0.075)), 0.8),
+        (Primitive(CYLINDER, (0.030, 0.025, 0.0), (0.0, 0.0, 0.175)), 0.1),
+        (Primitive(CYLINDER, (0.045, 0.060, 0.0), (0.0, 0.0, 0.260)), 0.1),  # the flowers
     ),
 )
 
 BOOKS = Thing(
     mass=1.5,
     looks=tuple(
-        part
+        primitive
         for z, half, colour in ((0.014, 0.014, BLUE), (0.041, 0.013, RED), (0.066, 0.012, OCHRE))
-        for part in (
-            Part(BOX, (0.055, 0.080, half), (0.0, 0.0, z), colour),
-            Part(BOX, (0.0550, 0.076, half - 0.003), (-0.003, 0.0, z), CREAM),  # the pages
+        for primitive in (
+            Primitive(BOX, (0.055, 0.080, half), (0.0, 0.0, z), colour),
+            Primitive(BOX, (0.0550, 0.076, half - 0.003), (-0.003, 0.0, z), CREAM),  # the pages
         )
     ),
-    touch=((Part(BOX, (0.057, 0.080, 0.039), (0.0, 0.0, 0.039)), 1.0),),
+    touch=((Primitive(BOX, (0.057, 0.080, 0.039), (0.0, 0.0, 0.039)), 1.0),),
 )
 
 LAMP = Thing(
     mass=1.2,
     looks=(
-        Part(CYLINDER, (0.055, 0.008, 0.0), (0.0, 0.0, 0.008), BRASS),
-        Part(ELLIPSOID, (0.030, 0.030, 0.045), (0.0, 0.0, 0.058), BRASS),
-        Part(CYLINDER, (0.008, 0.070, 0.0), (0.0, 0.0, 0.150), BRASS),
-        Part(CYLINDER, (0.075, 0.050, 0.0), (0.0, 0.0, 0.260), CREAM),  # shade
-        Part(CYLINDER, (0.077, 0.004, 0.0), (0.0, 0.0, 0.213), BRASS),
-        Part(CYLINDER, (0.077, 0.004, 0.0), (0.0, 0.0, 0.307), BRASS),
+        Primitive(CYLINDER, (0.055, 0.008, 0.0), (0.0, 0.0, 0.008), BRASS),
+        Primitive(ELLIPSOID, (0.030, 0.030, 0.045), (0.0, 0.0, 0.058), BRASS),
+        Primitive(CYLINDER, (0.008, 0.070, 0.0), (0.0, 0.0, 0.150), BRASS),
+        Primitive(CYLINDER, (0.075, 0.050, 0.0), (0.0, 0.0, 0.260), CREAM),  # shade
+        Primitive(CYLINDER, (0.077, 0.004, 0.0), (0.0, 0.0, 0.213), BRASS),
+        Primitive(CYLINDER, (0.077, 0.004, 0.0), (0.0, 0.0, 0.307), BRASS),
     ),
     touch=(
-        (Part(CYLINDER, (0.055, 0.008, 0.0), (0.0, 0.0, 0.008)), 0.75),
-        (Part(CYLINDER, (0.020, 0.098, 0.0), (0.0, 0.0, 0.114)), 0.15),
-        (Part(CYLINDER, (0.077, 0.051, 0.0), (0.0, 0.0, 0.260)), 0.10),
+        (Primitive(CYLINDER, (0.055, 0.008, 0.0), (0.0, 0.0, 0.008)), 0.75),
+        (Primitive(CYLINDER, (0.020, 0.098, 0.0), (0.0, 0.0, 0.114)), 0.15),
+        (Primitive(CYLINDER, (0.077, 0.051, 0.0), (0.0, 0.0, 0.260)), 0.10),
     ),
 )
 

@@ -77,9 +77,9 @@ class Cabinet:
     ceiling: float = 0.76
     wall: float = 0.018
 
-    def raised(self, lift: float) -> "Cabinet":
-        """The cabinet with its compartment ``lift`` [m] higher."""
-        return replace(self, floor=self.floor + lift, ceiling=self.ceiling + lift)
+    def raised(self, offset: float) -> "Cabinet":
+        """The cabinet with its compartment ``offset`` [m] higher."""
+        return replace(self, floor=self.floor + offset, ceiling=self.ceiling + offset)
 
     def add(self, spec: mujoco.MjSpec, name: str, material: str, inside: str, sides: str) -> mujoco.MjsBody:
         """Add the cabinet, fixed to the world; its back has the ``inside`` material."""
@@ -109,9 +109,9 @@ class Wall:
     height: float = 0.95
     thickness: float = 0.02
 
-    def raised(self, lift: float) -> "Wall":
-        """The wall, ``lift`` [m] higher."""
-        return replace(self, height=self.height + lift)
+    def raised(self, offset: float) -> "Wall":
+        """The wall, ``offset`` [m] higher."""
+        return replace(self, height=self.height + offset)
 
     def add(self, spec: mujoco.MjSpec, name: str, material: str) -> mujoco.MjsBody:
         """Add the wall, fixed to the world."""
@@ -130,9 +130,9 @@ class Stand:
     height: float = 0.50
     size: tuple[float, float] = (0.24, 0.30)
 
-    def raised(self, lift: float) -> "Stand":
-        """The stand with its top ``lift`` [m] higher."""
-        return replace(self, height=self.height + lift)
+    def raised(self, offset: float) -> "Stand":
+        """The stand with its top ``offset`` [m] higher."""
+        return replace(self, height=self.height + offset)
 
     def add(self, spec: mujoco.MjSpec, name: str, material: str) -> mujoco.MjsBody:
         """Add the stand, fixed to the world."""
@@ -156,9 +156,9 @@ class PushButton:
     stiffness: float = 200.0  # [N/m] of the spring under it
     mass: float = 0.05  # [kg] of the cap
 
-    def raised(self, lift: float) -> "PushButton":
-        """The button on a pedestal that is ``lift`` [m] higher."""
-        return replace(self, height=self.height + lift)
+    def raised(self, offset: float) -> "PushButton":
+        """The button on a pedestal that is ``offset`` [m] higher."""
+        return replace(self, height=self.height + offset)
 
     @property
     def rest(self) -> float:

@@ -1,4 +1,4 @@
-"""How much worlds and demonstrations vary: numbers that come from recipes, checked."""
+"""Validation of the ranges of randomisation, which come from recipes."""
 
 from collections.abc import Sequence
 
@@ -10,7 +10,7 @@ SLOWEST = 0.01  # share of the joints' velocity limits
 
 
 def span(name: str, value: float) -> float:
-    """Return how far something varies, a number of at least 0; else raise RandomisationError."""
+    """Return a half range, a number of at least 0; else raise RandomisationError."""
     if _numbers(value, ()) and value >= 0:
         return float(value)
     raise RandomisationError(f"{name} must be a number of at least 0, not {value!r}.")
@@ -24,7 +24,7 @@ def sides(name: str, value: Sequence[float]) -> tuple[float, float]:
 
 
 def interval(name: str, value: Sequence[float], least: float = 0.0) -> tuple[float, float]:
-    """Return the lowest and the highest of what is drawn, at least ``least``; else raise RandomisationError."""
+    """Return the lowest and highest value of a range, at least ``least``; else raise RandomisationError."""
     if _numbers(value, (2,)) and least <= value[0] <= value[1]:
         return float(value[0]), float(value[1])
     raise RandomisationError(f"{name} must be the lowest and the highest number, at least {least:g}, not {value!r}.")

@@ -37,7 +37,7 @@ COLOURS = {"panda_link5": WHITE, "panda_link6": WHITE, "panda_link7": GREY, "pan
 
 @dataclass(frozen=True)
 class RobotModel:
-    """Indices of a compiled robot: where its joints and actuators are."""
+    """Addresses of the robot's joints and actuators in a compiled model."""
 
     joint_qpos: np.ndarray  # (n,) addresses in qpos
     finger_qpos: np.ndarray  # (2,)
@@ -67,6 +67,10 @@ class RobotModel:
         """Set the servo targets: joint angles (n,) [rad] and the gripper's opening in [0, 1]."""
         data.ctrl[self.actuators] = q
         data.ctrl[self.gripper] = opening * FINGER_TRAVEL
+
+    def joint_positions(self, data: mujoco.MjData) -> np.ndarray:
+        """Measured joint angles (n,) [rad], a copy."""
+        return data.qpos[self.joint_qpos].copy()
 
     def opening(self, data: mujoco.MjData) -> float:
         """Measured opening of the gripper in [0, 1]."""
@@ -109,8 +113,8 @@ def robot_spec(arm: Arm) -> mujoco.MjSpec:
     return spec
 
 
-def lift(arm: Arm) -> float:
-    """How much higher [m] an arm carries its shoulder than the Panda does, both at home."""
+def shoulder_offset(arm: Arm) -> float:
+    """Height [m] of an arm's shoulder above that of the Panda, both at home."""
 
     def height(which: Arm) -> float:
         return float(kinematics_of(which).frame_pose(which.home, SHOULDER)[2, 3])

@@ -1,11 +1,11 @@
-"""What every world has: the robot on its bench, light, materials and cameras."""
+"""The scene common to all tasks: the robot on its bench, lights, materials and cameras."""
 
 import mujoco
 
 from er_il.arms.arm import Arm
 from sim_tasks.world.camera import LARGEST_PICTURE, VIEWS
 from sim_tasks.world.props import BOX
-from sim_tasks.world.robot import lift, robot_spec
+from sim_tasks.world.robot import robot_spec, shoulder_offset
 
 # name: colour, specular, shininess, reflectance
 MATERIALS = {
@@ -56,5 +56,5 @@ def scene_spec(arm: Arm) -> mujoco.MjSpec:
                 type=BOX, size=(0.025, 0.025, 0.355), pos=(x, y, -0.395), material="bench", contype=0, conaffinity=0
             )
     for view in VIEWS:
-        view.add(spec, lift(arm))
+        view.add(spec, shoulder_offset(arm))
     return spec

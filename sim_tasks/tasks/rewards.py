@@ -1,0 +1,37 @@
+"""Dense rewards made of named terms."""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+SUCCESS = "success"
+
+
+class Reward:
+    """A weighted sum of stages of a task, each with a progress in [0, 1], and of success.
+
+    The weights sum to 1, so the reward is in [0, 1]. Since success has a weight of its own, the reward reaches
+    1 only in a state that is a success, and there every stage must be complete.
+    """
+
+    def __init__(self, **weights: float) -> None:
+        """Declare the weights of the stages in the order in which they are passed, ``success`` among them."""
+        if SUCCESS not in weights or min(weights.values()) <= 0 or math.fsum(weights.values()) != 1.0:
+            raise ValueError(f"Weights must be positive, sum to 1 and include {SUCCESS!r}: {weights}.")
+        self.weights = weights
+
+    def terms(self, progress: Mapping[str, float], success: bool) -> dict[str, float]:
+        """Terms of the reward by name, which sum to it; ``progress`` holds that of each stage."""
+        complete = dict(progress) | {SUCCESS: float(success)}
+        return {name: weight * float(np.clip(complete[name], 0.0, 1.0)) for name, weight in self.weights.items()}
+
+
+def total(terms: Mapping[str, float]) -> float:
+    """The reward: the sum of its terms, rounded once."""
+    return math.fsum(terms.values())
+
+
+def proximity(distance: float, width: float) -> float:
+    """Closeness in (0, 1] at a distance [m]: exp(-distance / width), 1 if the distance is not positive."""
+    return math.exp(-max(distance, 0.0) / width)
