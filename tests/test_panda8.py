@@ -9,7 +9,7 @@ import pytest
 from documented import documented, run, train_in_process
 from lerobot.policies.act.configuration_act import ACTConfig
 
-from er_il import Arm, make_action_space
+from er_il import ActionSpace, Arm, make_action_space
 from er_il.envs.contract import Contract
 from er_il.envs.decoders import Decoder
 from er_il.envs.wrapper import make_action_space_env
@@ -40,7 +40,7 @@ def test_the_leader_leans_and_succeeds_and_so_do_its_encoded_actions(task: str) 
         decoding.reset(seed=0)
         assert decoding.action_space.shape == ({"joint": 9, "erj": 10}[kind],)
         info: dict = {}
-        for action in decoding.space.encode(demo[:, :-1], demo[:, -1]):
+        for action in ActionSpace(decoding.space).encode(demo[:, :-1], demo[:, -1]):
             _, _, terminated, _, info = decoding.step(action.astype(np.float32))
             assert info["decode_status"] == "ok"
             if terminated:
