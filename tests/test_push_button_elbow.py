@@ -6,7 +6,7 @@ from playing import play
 
 from er_il.kinematics.redundancy import JointAngle
 from er_il.kinematics.solver import Status, kinematics_of
-from er_il.spaces import make_action_space
+from er_il.spaces.action_space import make_action_space
 from sim_tasks.leader.scripts.button import DEPTH
 from sim_tasks.tasks.push_button_elbow import BUTTON, PEDESTAL, PRESSED, PushButtonElbow
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from playing import play
 
-from er_il.spaces import make_action_space
+from er_il.spaces.action_space import make_action_space
 from sim_tasks.tasks.retrieve_bear import DISPLACED, RetrieveBear
 
 ASIDE = {
