@@ -20,7 +20,7 @@ from er_il.evaluation.rollouts import Cell
 from er_il.experiments.grid import Entry, Grid
 from er_il.experiments.jobs import RollOut, Train, roll_outs, steps_of
 from er_il.policy.configuration import default_config
-from er_il.support.atomic_files import write_whole
+from er_il.support.atomic_files import write_atomically
 from er_il.support.errors import ErIlError
 
 OWNER = "benchmark.json"
@@ -99,7 +99,7 @@ class Plan:
             raise ErIlError(f"{self.out} holds something else than a benchmark; choose another --out.")
         self.out.mkdir(parents=True, exist_ok=True)
         claim = json.dumps({"title": self.grid.title, "configurations": theirs | mine}, indent=2)
-        write_whole(owner, lambda path: path.write_text(claim))
+        write_atomically(owner, lambda path: path.write_text(claim))
 
     @cached_property
     def _demonstrations(self) -> dict[str, Demonstrate]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 
-def write_whole(path: Path, write: Callable[[Path], object]) -> None:
+def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
     """Let ``write`` write a file under another name of the same ending, and give it its own once it is whole.
 
     Where it fails, as on a full disk, nothing is left of it.
@@ -25,7 +25,7 @@ def write_whole(path: Path, write: Callable[[Path], object]) -> None:
 
 def write_json(path: Path, data: Mapping[str, Any]) -> None:
     """Write a report, for people to read too."""
-    write_whole(path, lambda partial: partial.write_text(json.dumps(data, indent=2) + "\n"))
+    write_atomically(path, lambda partial: partial.write_text(json.dumps(data, indent=2) + "\n"))
 
 
 def write_arrays(path: Path, arrays: Mapping[str, Any]) -> None:
@@ -35,4 +35,4 @@ def write_arrays(path: Path, arrays: Mapping[str, Any]) -> None:
         with partial.open("wb") as file:  # given a path, NumPy would add an ending where there is none
             np.savez_compressed(file, allow_pickle=False, **arrays)
 
-    write_whole(path, write)
+    write_atomically(path, write)
