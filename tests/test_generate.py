@@ -3,7 +3,7 @@ import sys
 import pytest
 
 from er_il.cli import USER_MISTAKE, main
-from er_il.datasets.record import Record
+from er_il.datasets.record import DatasetRecord
 
 
 def _run(monkeypatch, *arguments):
@@ -16,7 +16,7 @@ def test_generate_takes_the_recipe_and_what_is_given_instead(monkeypatch, tmp_pa
     _run(monkeypatch, "generate", "lift_cup", "--episodes", 2, "--seed", 4, "--spaces", "joint,erj", "--out", out)
     assert "2 demonstrations" in capsys.readouterr().out
     assert sorted(path.name for path in out.iterdir()) == ["erj", "joint"]
-    recipe = Record.read(out / "erj").recipe
+    recipe = DatasetRecord.read(out / "erj").recipe
     assert (recipe.task, recipe.episodes, recipe.validation, recipe.seed) == ("lift_cup", 2, 1, 4)
     _run(monkeypatch, "generate", "lift_cup", "--episodes", 2, "--seed", 4, "--spaces", "joint", "--out", out)
     assert "was there already" in capsys.readouterr().out

@@ -14,7 +14,7 @@ from rich.progress import Progress
 from er_il.datasets.demos import Demo, make_world, record_demo
 from er_il.datasets.normalisation import LEAST_DEVIATION, LEAST_ROTATION, MARGIN
 from er_il.datasets.recipe import Recipe
-from er_il.datasets.record import Record
+from er_il.datasets.record import DatasetRecord
 from er_il.datasets.recording import generate
 from er_il.datasets.schema import DEMO_SEED, ENVIRONMENT_STATE, LEADER_JOINTS, STATE
 from er_il.spaces import from_spec
@@ -49,7 +49,7 @@ def test_a_dataset_says_what_it_holds(generated):
     assert columns["observation.environment_state"]["names"][0] == "cup.x"
     assert dataset[0]["task"] == dataset.meta.tasks.index[0] != ""
     assert [name for name in columns if name.startswith(ACTION)] == [ACTION]  # others would become policy outputs
-    record = Record.read(generated.paths["erj"])
+    record = DatasetRecord.read(generated.paths["erj"])
     assert record.recipe == RECIPE
     assert record.dropped == generated.dropped
     assert generated.new == ("joint", "erj")

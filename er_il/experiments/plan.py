@@ -12,7 +12,7 @@ from pathlib import Path
 import yaml
 from rich.progress import Progress
 
-from er_il.datasets.record import Record
+from er_il.datasets.record import DatasetRecord
 from er_il.datasets.recording import generate
 from er_il.evaluation.posture_baselines import space_of
 from er_il.evaluation.results import load_cell
@@ -74,7 +74,9 @@ class Plan:
         """
         for task, demonstrate in self._demonstrations.items():
             for dataset in (demonstrate.out / space for space in demonstrate.spaces):
-                if dataset.exists() and (what := self.grid.recipe(task).differences(Record.read(dataset).recipe)):
+                if dataset.exists() and (
+                    what := self.grid.recipe(task).differences(DatasetRecord.read(dataset).recipe)
+                ):
                     raise ErIlError(
                         f"{dataset} holds another recipe's demonstrations; asked for is {what}. "
                         f"Choose another --out, or delete what {self.out} holds of {task}."
