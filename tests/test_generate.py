@@ -28,8 +28,11 @@ def test_generate_takes_the_recipe_and_what_is_given_instead(monkeypatch, tmp_pa
         (["sweep"], "Unknown task 'sweep'. Valid: lift_cup, "),
         (["reach_cup", "--spaces", "polar"], "Unknown action space 'polar'. Valid: joint, task, erj"),
         (["reach_cup", "--cameras", "elbow"], "Unknown camera 'elbow'. Valid: "),
-        (["reach_cup", "--episodes", "0"], "at least one episode, not 0"),
-        (["reach_cup", "--size", "7", "--cameras", "wrist"], "image size is 7"),
+        (["reach_cup", "--episodes", "0"], "episodes is 0: Input should be greater than or equal to 1"),
+        (
+            ["reach_cup", "--size", "14", "--cameras", "wrist"],
+            "image_size is 14: Input should be greater than or equal to 16",
+        ),
         (["reach_cup", "--out", "/dev/null/here"], "Cannot write to /dev/null/here: Not a directory."),
     ],
 )

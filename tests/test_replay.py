@@ -1,5 +1,4 @@
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +16,7 @@ from er_il.evaluation.replay import find_datasets, replay, replay_demo, write_re
 from er_il.support.errors import DatasetError
 
 _UNSPECIFIED = {"codebase_version": "v3.0", "fps": 20, "total_frames": 1, "features": {"action": {"shape": [1]}}}
-RECIPE = replace(Recipe.load("reach_cup"), disturbance=0.0).resized(2)
+RECIPE = Recipe.load("reach_cup").replaced(disturbance=0.0).resized(2)
 
 
 @pytest.fixture(scope="module")

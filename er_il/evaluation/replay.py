@@ -6,7 +6,7 @@ fails, the encoding has lost something that the task needs.
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -150,7 +150,7 @@ class _Play:
     rotation: str
 
     def make(self) -> DecodingEnv:
-        environment = replace(self.recipe, cameras=()).environment
+        environment = self.recipe.replaced(cameras=()).environment
         return make_decoding_env(
             task_id(self.recipe.task), decoder(self.decoder), rotation=self.rotation, **environment
         )

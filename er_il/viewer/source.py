@@ -34,7 +34,7 @@ def read_source(source: Path, episode: int | None = None, arm: str = "") -> tupl
             return trace, []
         recipe = DatasetRecord.read(source).recipe
         trace = replace(trace, task=recipe.task)
-        return trace, shapes_of(trace, replace(recipe, cameras=()).environment)
+        return trace, shapes_of(trace, recipe.replaced(cameras=()).environment)
     if not source.exists():
         raise DatasetError(f"There is no dataset or trace {source}.")
     if source.suffix != SUFFIX:
