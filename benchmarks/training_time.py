@@ -12,7 +12,6 @@ import os
 import re
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -44,7 +43,7 @@ def measure(training: Training, module: str, window: int) -> tuple[float, float]
 
 def main(demonstrations: int = 5, window: int = 30, out: Path = Path("results/training_time")) -> None:
     """Measure both commands on both inputs; write the report."""
-    recipe = replace(Recipe.load(TASK), cameras=("wrist",)).resized(demonstrations)
+    recipe = Recipe.load(TASK).replaced(cameras=("wrist",)).resized(demonstrations)
     rows = []
     with TemporaryDirectory() as folder, Progress() as progress:
         data = Path(folder) / "data"

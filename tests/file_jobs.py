@@ -13,7 +13,7 @@ import gymnasium
 
 import sim_tasks  # noqa: F401  registers the tasks
 from er_il.experiments.schedule import FileResult
-from er_il.support.atomic_files import write_whole
+from er_il.support.atomic_files import write_atomically
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class FileJob(FileResult):
         result = simulated(self.seed)
         for need in self.needs:
             result += json.loads(need.path.read_text())
-        write_whole(self.path, lambda path: path.write_text(json.dumps(result)))
+        write_atomically(self.path, lambda path: path.write_text(json.dumps(result)))
 
 
 @dataclass

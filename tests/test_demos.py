@@ -1,5 +1,3 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -67,15 +65,15 @@ def test_saved_demos_come_back(tmp_path):
 
 
 def test_demos_that_cannot_succeed_end_with_their_reasons(tmp_path):
-    unreachable = replace(RECIPE, randomisation={**RECIPE.randomisation, "via_range": 5.0})
+    unreachable = RECIPE.replaced(randomisation={**RECIPE.randomisation, "via_range": 5.0})
     with pytest.raises(DatasetError, match=r"10 of the first 10 demos failed \(no plan 10\).*randomisation"):
         list(collect(unreachable, tmp_path, workers=1))
 
 
 def test_a_recipe_that_the_environment_refuses():
     with pytest.raises(DatasetError, match="colour"):
-        make_world(replace(RECIPE, randomisation={"colour": "red"}))
+        make_world(RECIPE.replaced(randomisation={"colour": "red"}))
     with pytest.raises(UnknownNameError, match="camera 'elbow'"):
-        make_world(replace(RECIPE, cameras=("elbow",)))
+        make_world(RECIPE.replaced(cameras=("elbow",)))
     with pytest.raises(UnknownNameError, match="task 'sweep'"):
-        make_world(replace(RECIPE, task="sweep"))
+        make_world(RECIPE.replaced(task="sweep"))

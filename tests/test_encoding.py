@@ -7,8 +7,9 @@ import pytest
 from lerobot.datasets import LeRobotDataset
 
 from er_il.arms.arm import Arm
+from er_il.datasets.dataset import Dataset
 from er_il.datasets.encoding import encode_dataset
-from er_il.datasets.normalisation import loosen_rotations
+from er_il.datasets.normalisation import bound_rotation_deviation
 from er_il.datasets.schema import LEADER_JOINTS, action_feature
 from er_il.spaces.layout import Layout
 from er_il.spaces.registry import make_arm_space
@@ -61,8 +62,8 @@ def joint(tmp_path_factory):
 @pytest.mark.parametrize("kind", ["erj", "task"])
 def test_re_encoding_equals_recording_in_that_space(joint, tmp_path, kind):
     native = _write(tmp_path / "native", kind)
-    loosen_rotations(native)
-    encode_dataset(joint, tmp_path / "encoded", _layout(kind))
+    bound_rotation_deviation(native)
+    encode_dataset(Dataset(joint), tmp_path / "encoded", _layout(kind))
     encoded = tmp_path / "encoded"
     _assert_same_data(encoded, native)
     assert (encoded / "meta/info.json").read_bytes() == (native / "meta/info.json").read_bytes()
@@ -77,7 +78,7 @@ def test_the_source_is_untouched_and_leftovers_are_cleared(joint, tmp_path):
     before = _hashes(joint)
     (tmp_path / "encoded.partial" / "data").mkdir(parents=True)
     (tmp_path / "encoded.partial" / "data" / "half.parquet").write_bytes(b"half")
-    encode_dataset(joint, tmp_path / "encoded", _layout("erj"))
+    encode_dataset(Dataset(joint), tmp_path / "encoded", _layout("erj"))
     assert _hashes(joint) == before
     assert [path.name for path in tmp_path.iterdir()] == ["encoded"]
     assert not list(tmp_path.rglob("half.parquet"))
@@ -85,13 +86,13 @@ def test_the_source_is_untouched_and_leftovers_are_cleared(joint, tmp_path):
 
 def test_the_recorded_joints_survive_any_chain_of_encodings(tmp_path):
     first = _write(tmp_path / "first", "joint", leader=True)
-    encode_dataset(first, tmp_path / "task", _layout("task"))  # drops the elbow
-    encode_dataset(tmp_path / "task", tmp_path / "back", _layout("joint"))
+    encode_dataset(Dataset(first), tmp_path / "task", _layout("task"))  # drops the elbow
+    encode_dataset(Dataset(tmp_path / "task"), tmp_path / "back", _layout("joint"))
     _assert_same_data(tmp_path / "back", first)
 
 
 def test_quaternions_are_continuous_within_and_start_afresh_in_each_episode(joint, tmp_path):
-    encode_dataset(joint, tmp_path / "task", _layout("task"))
+    encode_dataset(Dataset(joint), tmp_path / "task", _layout("task"))
     dataset = LeRobotDataset("er_il/test", root=tmp_path / "task", video_backend="pyav")
     quaternions = np.stack(dataset.hf_dataset[ACTION])[:, 3:7]
     one, other = np.split(quaternions, [LENGTHS[0]])
@@ -105,11 +106,11 @@ def test_datasets_that_cannot_be_encoded(joint, tmp_path):
     erj = _layout("erj")
     task = _write(tmp_path / "task", "task")
     with pytest.raises(DatasetError, match="no joint angles"):
-        encode_dataset(task, tmp_path / "out", erj)
+        encode_dataset(Dataset(task), tmp_path / "out", erj)
     with pytest.raises(DatasetError, match=r"not a LeRobot v3 dataset"):
-        encode_dataset(tmp_path / "nothing", tmp_path / "out", erj)
+        encode_dataset(Dataset(tmp_path / "nothing"), tmp_path / "out", erj)
     with pytest.raises(FileExistsError):
-        encode_dataset(joint, task, erj)
+        encode_dataset(Dataset(joint), task, erj)
     assert not (tmp_path / "out").exists()
 
 

@@ -3,7 +3,7 @@ import sys
 import pytest
 
 from er_il.cli import USER_MISTAKE, main
-from er_il.datasets.record import Record
+from er_il.datasets.record import DatasetRecord
 
 
 def _run(monkeypatch, *arguments):
@@ -16,7 +16,7 @@ def test_generate_takes_the_recipe_and_what_is_given_instead(monkeypatch, tmp_pa
     _run(monkeypatch, "generate", "lift_cup", "--episodes", 2, "--seed", 4, "--spaces", "joint,erj", "--out", out)
     assert "2 demonstrations" in capsys.readouterr().out
     assert sorted(path.name for path in out.iterdir()) == ["erj", "joint"]
-    recipe = Record.read(out / "erj").recipe
+    recipe = DatasetRecord.read(out / "erj").recipe
     assert (recipe.task, recipe.episodes, recipe.validation, recipe.seed) == ("lift_cup", 2, 1, 4)
     _run(monkeypatch, "generate", "lift_cup", "--episodes", 2, "--seed", 4, "--spaces", "joint", "--out", out)
     assert "was there already" in capsys.readouterr().out
@@ -28,8 +28,11 @@ def test_generate_takes_the_recipe_and_what_is_given_instead(monkeypatch, tmp_pa
         (["sweep"], "Unknown task 'sweep'. Valid: lift_cup, "),
         (["reach_cup", "--spaces", "polar"], "Unknown action space 'polar'. Valid: joint, task, erj"),
         (["reach_cup", "--cameras", "elbow"], "Unknown camera 'elbow'. Valid: "),
-        (["reach_cup", "--episodes", "0"], "at least one episode, not 0"),
-        (["reach_cup", "--size", "7", "--cameras", "wrist"], "image size is 7"),
+        (["reach_cup", "--episodes", "0"], "episodes is 0: Input should be greater than or equal to 1"),
+        (
+            ["reach_cup", "--size", "14", "--cameras", "wrist"],
+            "image_size is 14: Input should be greater than or equal to 16",
+        ),
         (["reach_cup", "--out", "/dev/null/here"], "Cannot write to /dev/null/here: Not a directory."),
     ],
 )

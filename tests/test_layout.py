@@ -140,10 +140,10 @@ def test_names_of_dimensions_in_all_of_lerobots_forms():
     ("text", "message"),
     [
         ("left: panda", "needs one entry an arm"),
-        ("left: {units: deg}", "needs a key arm"),
-        ("left: {arm: panda, unit: deg}", "Unknown key of arm 'left' 'unit'. Valid: arm, ee_frame"),
-        ("left: {arm: panda, joints: a}", "joints of arm 'left' is a list"),
-        ("left: {arm: [panda", "Cannot read"),
+        ("left: {units: deg}", "wiring of arm 'left' lacks arm"),
+        ("left: {arm: panda, unit: deg}", "wiring of arm 'left' has no unit. Valid: arm, label, ee_frame"),
+        ("left: {arm: panda, joints: a}", "joints is 'a': .*valid tuple"),
+        ("left: {arm: [panda", "is not valid YAML"),
     ],
 )
 def test_files_of_arms_that_cannot_be_read(tmp_path, text, message):
@@ -156,11 +156,15 @@ def test_files_of_arms_that_cannot_be_read(tmp_path, text, message):
 @pytest.mark.parametrize(
     ("wiring", "error", "message"),
     [
-        (Wiring("ur5"), UnknownNameError, "Unknown arm 'ur5'. Valid: gen3, panda, panda8, xarm7, the path of a URDF"),
-        (Wiring("panda"), DatasetError, "Which dimensions are the joints of panda"),
-        (Wiring("panda", joints=("elbow",)), UnknownNameError, "Unknown dimension of the action 'elbow'. Valid: "),
-        (Wiring("panda", joints=NAMES[:3]), DatasetError, "panda has 7 joints .* but 3 dimensions are given"),
-        (Wiring("panda", joints=(NAMES[0],) * 7), DatasetError, "one joint only"),
+        (
+            Wiring(arm="ur5"),
+            UnknownNameError,
+            "Unknown arm 'ur5'. Valid: gen3, panda, panda8, xarm7, the path of a URDF",
+        ),
+        (Wiring(arm="panda"), DatasetError, "Which dimensions are the joints of panda"),
+        (Wiring(arm="panda", joints=("elbow",)), UnknownNameError, "Unknown dimension of the action 'elbow'. Valid: "),
+        (Wiring(arm="panda", joints=NAMES[:3]), DatasetError, "panda has 7 joints .* but 3 dimensions are given"),
+        (Wiring(arm="panda", joints=(NAMES[0],) * 7), DatasetError, "one joint only"),
     ],
 )
 def test_wirings_that_do_not_fit(wiring, error, message):
@@ -171,6 +175,6 @@ def test_wirings_that_do_not_fit(wiring, error, message):
 def test_a_preset_with_another_end_effector_is_an_arm_of_its_own():
     joints = tuple(f"{joint}.pos" for joint in PANDA.joints)
     features = {ACTION: {"shape": (7,), "names": list(joints)}}
-    layout = wire([Wiring("panda", ee_frame="panda_link8")], features, "erj", "quat")
+    layout = wire([Wiring(arm="panda", ee_frame="panda_link8")], features, "erj", "quat")
     assert layout.parts[0].motors.joints == joints  # found by the arm's own names
     assert Layout.from_spec(layout.spec()).parts[0].space.arm.ee_frame == "panda_link8"

@@ -9,6 +9,8 @@ from er_il.datasets.recipe import DEMO_SEED_BASE, Recipe, recipe_names
 from er_il.envs.tasks import task_id, task_names
 from er_il.support.errors import DatasetError, UnknownNameError
 
+VALID = {"task": "reach_cup", "episodes": 40, "validation": 8}
+RECIPE = Recipe.from_dict(VALID)
 FIRST_EVALUATION_SEED = 1000  # LeRobot's
 
 
@@ -23,25 +25,24 @@ def test_shipped_recipes_are_the_paper_s_split_and_fit_a_task():
 
 
 def test_round_trip_through_json():
-    recipe = Recipe(
-        "reach_cup", 5, 1, seed=3, cameras=("wrist",), image_size=32, randomisation={"cup_range": [0.01, 0.02]}
-    )
+    ranges = {"cup_range": [0.01, 0.02]}
+    recipe = RECIPE.replaced(episodes=5, validation=1, seed=3, cameras=("wrist",), image_size=32, randomisation=ranges)
     assert Recipe.from_dict(json.loads(json.dumps(recipe.to_dict()))) == recipe
 
 
 @pytest.mark.parametrize(("episodes", "validation"), [(40, 8), (10, 2), (12, 3), (2, 1), (1, 0)])
 def test_resized_keeps_the_share_and_something_to_train_on(episodes, validation):
-    assert Recipe("reach_cup", 40, 8).resized(episodes).validation == validation
+    assert RECIPE.resized(episodes).validation == validation
 
 
 def test_demo_seeds_never_meet_evaluation_seeds_nor_another_recipe_seed():
-    demos = [set(_first(Recipe("reach_cup", 40, 8, seed=seed).demo_seeds(), 200)) for seed in (0, 1, 2)]
+    demos = [set(_first(RECIPE.replaced(seed=seed).demo_seeds(), 200)) for seed in (0, 1, 2)]
     assert not demos[0] & demos[1] | demos[1] & demos[2] | demos[0] & demos[2]
     assert min(min(seeds) for seeds in demos) >= DEMO_SEED_BASE > FIRST_EVALUATION_SEED + 10_000
 
 
 def test_differences_name_key_and_both_values():
-    one, other = Recipe("reach_cup", 40, 8), Recipe("reach_cup", 40, 8, seed=7, cameras=("wrist",))
+    one, other = RECIPE, RECIPE.replaced(seed=7, cameras=("wrist",))
     assert one.differences(one) == ""
     assert one.differences(other) == "seed 0 instead of 7, cameras [] instead of ['wrist']"
 
@@ -51,21 +52,32 @@ def test_differences_name_key_and_both_values():
     [
         ("reach_cup", "mapping"),
         ({"task": "reach_cup", "episodes": 40}, "lacks validation"),
-        ({"task": "reach_cup", "episodes": 40, "validation": 8, "camera": []}, "no camera. Valid: task"),
-        ({"task": "reach_cup", "episodes": "many", "validation": 8}, "'many', not a whole number"),
-        ({"task": "reach_cup", "episodes": True, "validation": 0}, "not a whole number"),
-        ({"task": "reach_cup", "episodes": 40, "validation": 8, "cameras": "wrist"}, "not a list"),
-        ({"task": "reach_cup", "episodes": 40, "validation": 8, "randomisation": [1]}, "not a mapping"),
-        ({"task": "reach_cup", "episodes": 0, "validation": 0}, "at least one episode, not 0"),
+        (VALID | {"camera": []}, "no camera. Valid: task"),
+        ({"task": "reach_cup", "episodes": "many", "validation": 8}, "episodes is 'many': .*valid integer"),
+        ({"task": "reach_cup", "episodes": True, "validation": 0}, "episodes is True: .*valid integer"),
+        (VALID | {"cameras": "wrist"}, "cameras is 'wrist': .*valid tuple"),
+        (VALID | {"randomisation": [1]}, r"randomisation is \[1\]: .*valid dictionary"),
+        ({"task": "reach_cup", "episodes": 0, "validation": 0}, "episodes is 0: .*greater than or equal to 1"),
         ({"task": "reach_cup", "episodes": 8, "validation": 8}, "at least one must be left"),
-        ({"task": "reach_cup", "episodes": 8, "validation": 1, "seed": -1}, "negative"),
-        ({"task": "reach_cup", "episodes": 8, "validation": 1, "image_size": 97}, "even number"),
-        ({"task": "reach_cup", "episodes": 8, "validation": 1, "cameras": ["wrist", "wrist"]}, "twice"),
+        (VALID | {"seed": -1}, "seed is -1: .*greater than or equal to 0"),
+        (VALID | {"image_size": 97}, "image_size is 97: .*multiple of 2"),
+        (VALID | {"image_size": 8}, "greater than or equal to 16"),
+        (VALID | {"disturbance": 0.1}, "disturbance is 0.1: .*less than 0.1"),
+        (VALID | {"cameras": ["wrist", "wrist"]}, "twice"),
+        ({"episodes": 0, "task": 3, "view": 1}, "no view. Valid: .* lacks validation. task is 3: .* episodes is 0: "),
     ],
 )
 def test_wrong_recipes_are_refused_by_name(values, message):
-    with pytest.raises(DatasetError, match=message):
+    with pytest.raises(DatasetError, match=message) as error_info:
         Recipe.from_dict(values)
+    assert len(str(error_info.value).splitlines()) == 1
+
+
+def test_replaced_values_are_checked_too():
+    with pytest.raises(DatasetError, match=r"no camera\. Valid: task"):
+        RECIPE.replaced(camera=())
+    with pytest.raises(DatasetError, match="episodes is 0"):
+        RECIPE.resized(0)
 
 
 def test_files_that_are_no_recipe(tmp_path):

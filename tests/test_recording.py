@@ -1,5 +1,6 @@
 import json
 import resource
+import shutil
 import subprocess
 import sys
 import time
@@ -14,12 +15,13 @@ from rich.progress import Progress
 from er_il.datasets.demos import Demo, make_world, record_demo
 from er_il.datasets.normalisation import LEAST_DEVIATION, LEAST_ROTATION, MARGIN
 from er_il.datasets.recipe import Recipe
-from er_il.datasets.record import Record
+from er_il.datasets.record import DatasetRecord
 from er_il.datasets.recording import generate
 from er_il.datasets.schema import DEMO_SEED, ENVIRONMENT_STATE, LEADER_JOINTS, STATE
 from er_il.spaces.action_space import from_spec
 from er_il.spaces.spec import ACTION, action_spec
-from er_il.support.errors import DatasetError, UnknownNameError
+from er_il.support.atomic_files import atomic_folder, work_folder
+from er_il.support.errors import DatasetError, ErIlError, UnknownNameError
 
 RECIPE = Recipe.load("lift_cup").resized(3)
 
@@ -49,7 +51,7 @@ def test_a_dataset_says_what_it_holds(generated):
     assert columns["observation.environment_state"]["names"][0] == "cup.x"
     assert dataset[0]["task"] == dataset.meta.tasks.index[0] != ""
     assert [name for name in columns if name.startswith(ACTION)] == [ACTION]  # others would become policy outputs
-    record = Record.read(generated.paths["erj"])
+    record = DatasetRecord.read(generated.paths["erj"])
     assert record.recipe == RECIPE
     assert record.dropped == generated.dropped
     assert generated.new == ("joint", "erj")
@@ -107,7 +109,7 @@ def test_same_seed_same_data_whatever_the_workers_and_the_first_space(generated,
     again = generate(RECIPE, ["erj", "joint"], tmp_path / "again", Progress(disable=True), workers=1)
     for kind in ("joint", "erj"):
         assert _table(again.paths[kind]).equals(_table(generated.paths[kind]))
-        stats = [json.loads((each.paths[kind] / "meta/stats.json").read_text()) for each in (again, generated)]
+        stats = [(each.paths[kind] / "meta/stats.json").read_bytes() for each in (again, generated)]
         assert stats[0] == stats[1]
     assert not list(tmp_path.glob("*.partial*"))
 
@@ -121,7 +123,7 @@ def test_a_space_can_be_added_later_and_another_recipe_is_refused(generated):
     assert _table(more.paths["task"]).column(LEADER_JOINTS).equals(before.column(LEADER_JOINTS))
     assert generate(RECIPE, ["task"], out, Progress(disable=True), workers=1).new == ()
     with pytest.raises(DatasetError, match=r"another recipe's data; asked for is seed 5 instead of 0\."):
-        generate(replace(RECIPE, seed=5), ["joint"], out, Progress(disable=True), workers=1)
+        generate(RECIPE.replaced(seed=5), ["joint"], out, Progress(disable=True), workers=1)
 
 
 def test_a_killed_run_resumes_with_what_it_had(generated, tmp_path):
@@ -147,16 +149,39 @@ def test_a_killed_run_resumes_with_what_it_had(generated, tmp_path):
     assert not (tmp_path / "lift_cup.partial").exists()
 
 
+def test_a_run_that_was_killed_while_encoding_resumes(generated, tmp_path):
+    out = tmp_path / "lift_cup"
+    shutil.copytree(generated.paths["joint"], out / "joint")
+    for partial in (out / "erj.partial", out / "erj.partial" / "erj"):  # as version 0.1.0 left it, and as this one does
+        shutil.copytree(generated.paths["joint"], partial)
+        (partial / "meta/stats.json").unlink()
+    resumed = generate(RECIPE, ["joint", "erj"], out, Progress(disable=True), workers=1)
+    assert resumed.new == ("erj",)
+    assert _table(resumed.paths["erj"]).equals(_table(generated.paths["erj"]))
+    assert sorted(path.name for path in out.iterdir()) == ["erj", "joint"]
+
+
+def test_one_run_at_a_time(generated, tmp_path):
+    out = tmp_path / "lift_cup"
+    with work_folder(out), pytest.raises(ErIlError, match=r"Another command works in .*lift_cup\.partial"):
+        generate(RECIPE, ["joint"], out, Progress(disable=True), workers=1)
+    shutil.copytree(generated.paths["joint"], out / "joint")
+    with atomic_folder(out / "erj") as partial:
+        with pytest.raises(ErIlError, match=r"Another command works in .*erj\.partial"):
+            generate(RECIPE, ["joint", "erj"], out, Progress(disable=True), workers=1)
+        partial.mkdir()
+
+
 def test_an_unfinished_run_of_another_recipe_is_refused(tmp_path):
     work = tmp_path / "lift_cup.partial"
     work.mkdir()
-    (work / "recipe.json").write_text(json.dumps(replace(RECIPE, seed=4).to_dict()))
+    (work / "recipe.json").write_text(json.dumps(RECIPE.replaced(seed=4).to_dict()))
     with pytest.raises(DatasetError, match="seed 0 instead of 4"):
         generate(RECIPE, ["joint"], tmp_path / "lift_cup", Progress(disable=True), workers=1)
 
 
 def test_cameras_are_recorded_once_and_shared(tmp_path):
-    recipe = replace(RECIPE.resized(2), cameras=("wrist", "shoulder"), image_size=32)
+    recipe = RECIPE.resized(2).replaced(cameras=("wrist", "shoulder"), image_size=32)
     made = generate(recipe, ["joint", "erj"], tmp_path / "seen", Progress(disable=True), workers=1)
     videos = [sorted(path.rglob("*.mp4")) for path in made.paths.values()]
     assert len(videos[0]) == 2
@@ -182,7 +207,7 @@ def test_wrong_requests(tmp_path):
     with pytest.raises(UnknownNameError, match="action space"):
         generate(RECIPE, [], tmp_path / "out", ask, workers=1)
     with pytest.raises(UnknownNameError, match="camera 'elbow'"):
-        generate(replace(RECIPE, cameras=("elbow",)), ["joint"], tmp_path / "out", ask, workers=1)
+        generate(RECIPE.replaced(cameras=("elbow",)), ["joint"], tmp_path / "out", ask, workers=1)
     (tmp_path / "file").write_text("")
     with pytest.raises(DatasetError, match=r"Cannot write to .*file/out: Not a directory"):
         generate(RECIPE, ["joint"], tmp_path / "file" / "out", ask, workers=1)

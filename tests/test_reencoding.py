@@ -16,10 +16,9 @@ from lerobot.scripts import lerobot_edit_dataset, lerobot_train
 from er_il import Arm
 from er_il.cli import USER_MISTAKE, main
 from er_il.datasets import decoding, encoding
-from er_il.datasets.encoding import dataset_info, dataset_layout
+from er_il.datasets.dataset import Dataset
 from er_il.datasets.hub import find_dataset
 from er_il.datasets.normalisation import LEAST_ROTATION
-from er_il.datasets.rewriting import read_vectors
 from er_il.datasets.schema import SOURCE_ACTION, STATE
 from er_il.spaces.spec import ACTION
 
@@ -67,12 +66,12 @@ def test_only_the_actions_differ(places):
     assert other.column_names == [*one.column_names, SOURCE_ACTION]
     untouched = [name for name in one.column_names if name != ACTION]
     assert other.select(untouched).equals(one.select(untouched))
-    assert np.array_equal(read_vectors(encoded, SOURCE_ACTION), read_vectors(source, ACTION))
+    assert np.array_equal(Dataset(encoded).vectors(SOURCE_ACTION), Dataset(source).vectors(ACTION))
     videos = sorted(path.relative_to(source) for path in source.glob("videos/**/*.mp4"))
     assert videos
     assert all((source / path).samefile(encoded / path) for path in videos)
-    features = dataset_info(encoded).features
-    assert features[STATE] == dataset_info(source).features[STATE]
+    features = Dataset(encoded).features
+    assert features[STATE] == Dataset(source).features[STATE]
     assert features[ACTION]["names"][:3] == ["left_ee.x", "left_ee.y", "left_ee.z"]
     assert len(features[ACTION]["names"]) == 2 * 8 + 3
     card = (encoded / "README.md").read_text()
@@ -83,10 +82,10 @@ def test_only_the_actions_differ(places):
 
 def test_statistics_are_lerobots_but_for_still_rotations(places, tmp_path):
     """Write the encoded dataset once more with plain LeRobot calls: the same statistics, digit by digit."""
-    actions, features = read_vectors(places / "erj", ACTION), dataset_info(places / "erj").features
+    actions, features = Dataset(places / "erj").vectors(ACTION), Dataset(places / "erj").features
     columns = {name: features[name] for name in (ACTION, SOURCE_ACTION)}
     native = LeRobotDataset.create("lab/native", 20, columns, root=tmp_path / "native", video_backend="pyav")
-    kept = read_vectors(places / "erj", SOURCE_ACTION)
+    kept = Dataset(places / "erj").vectors(SOURCE_ACTION)
     for start, stop in zip(np.cumsum([0, *LENGTHS[:-1]]), np.cumsum(LENGTHS), strict=True):
         for row in range(start, stop):
             native.add_frame({ACTION: actions[row], SOURCE_ACTION: kept[row], "task": "fold"})
@@ -119,28 +118,28 @@ def test_the_round_trip_is_exact_where_the_elbow_is_commanded(places, tmp_path, 
         error = report["arms"][arm]["joint_error_unflagged"]["p100"]
         assert error <= 1e-3 if kind != "task" else error > 1e-3
         assert report["arms"][arm]["position_error"]["p100"] <= 1e-4
-        assert report["arms"][arm]["suspicion"] == ""
+        assert report["arms"][arm]["finding"] == ""
         assert report["arms"][arm]["quaternions_other_side"] == 0
 
 
 def test_back_to_joints_through_the_decoder(places, tmp_path, monkeypatch):
     args = ("--to", "erj", "--arms", places / "arms.yaml", "--no-keep", "--out", tmp_path / "bare")
     _run(monkeypatch, "encode", places / "source", *args)
-    assert SOURCE_ACTION not in dataset_info(tmp_path / "bare").features
+    assert SOURCE_ACTION not in Dataset(tmp_path / "bare").features
     _run(monkeypatch, "encode", tmp_path / "bare", "--to", "joint", "--out", tmp_path / "back")
-    back = read_vectors(tmp_path / "back", ACTION)
-    assert dataset_info(tmp_path / "back").features[ACTION]["names"] == list(NAMES)
+    back = Dataset(tmp_path / "back").vectors(ACTION)
+    assert Dataset(tmp_path / "back").features[ACTION]["names"] == list(NAMES)
     assert np.abs(back - RECORDED).max() < np.rad2deg(1e-3)
     _run(monkeypatch, "encode", tmp_path / "bare", "--to", "task", "--out", tmp_path / "task")  # decodes on the way
     _run(monkeypatch, "encode", places / "erj", "--to", "task", "--out", tmp_path / "direct")
-    assert np.abs(read_vectors(tmp_path / "task", ACTION) - read_vectors(tmp_path / "direct", ACTION)).max() < 1e-4
+    assert (
+        np.abs(Dataset(tmp_path / "task").vectors(ACTION) - Dataset(tmp_path / "direct").vectors(ACTION)).max() < 1e-4
+    )
 
 
 def test_flagged_frames_and_stretches_near_singularities_are_found(places, tmp_path, monkeypatch):
     """Episode 1 passes through the stretched elbow, 2 has an action that cannot be decoded, in 3 the hand spins."""
-    names = [
-        f"{joint}.pos" for joint in dataset_layout(dataset_info(places / "erj").features).parts[0].space.arm.joints
-    ]
+    names = [f"{joint}.pos" for joint in Dataset(places / "erj").layout.parts[0].space.arm.joints]
     feature = {"dtype": "float32", "shape": (7,), "names": names}
     dataset = LeRobotDataset.create("lab/one", 20, {ACTION: feature}, root=tmp_path / "one", video_backend="pyav")
     home = np.array([0.3, 0.2, 0.1, -1.5, 0.2, 1.7, 0.8], dtype=np.float32)
@@ -224,9 +223,9 @@ def test_what_lerobot_edits_still_decodes_and_trains(places, tmp_path, monkeypat
     )
     assert len(list(tmp_path.glob("merged/data/*/*.parquet"))) == 3
     _run(monkeypatch, "encode", tmp_path / "merged", "--to", "era", "--out", tmp_path / "again")
-    spec = dataset_info(places / "erj").features[ACTION]["info"]
+    spec = Dataset(places / "erj").features[ACTION]["info"]
     for dataset in (*roots, tmp_path / "less", tmp_path / "merged"):
-        assert dataset_info(dataset).features[ACTION]["info"] == spec
+        assert Dataset(dataset).features[ACTION]["info"] == spec
     sizes = {roots[0]: 1, roots[1]: 2, tmp_path / "less": 2, tmp_path / "merged": 5, tmp_path / "again": 5}
     for dataset, episodes in sizes.items():
         report = _verified(monkeypatch, dataset, tmp_path / "report" / dataset.name)
@@ -317,9 +316,9 @@ def test_an_arm_of_a_file_needs_it_only_once(places, tmp_path, monkeypatch, caps
 
 
 def test_worker_processes_decode_the_same(places, monkeypatch):
-    info = dataset_info(places / "erj")
-    layout = dataset_layout(info.features)
-    episodes = encoding.read_episodes(places / "erj", info, layout)
+    dataset = Dataset(places / "erj")
+    layout = dataset.layout
+    episodes = decoding.read_encoded_episodes(dataset, layout)
     alone = decoding.decode_episodes(layout, episodes, workers=1)
     monkeypatch.setattr(decoding, "FEW_FRAMES", 0)
     done: list[int] = []
@@ -335,9 +334,9 @@ def test_a_failure_leaves_nothing_behind(places, tmp_path, monkeypatch):
         assert (folder / "meta/info.json").exists()
         raise KeyboardInterrupt
 
-    layout = dataset_layout(dataset_info(places / "erj").features)
+    layout = Dataset(places / "erj").layout
     with pytest.raises(KeyboardInterrupt):
-        encoding.encode_dataset(places / "erj", tmp_path / "out", layout, finish=fail)
+        encoding.encode_dataset(Dataset(places / "erj"), tmp_path / "out", layout, finish=fail)
     assert list(tmp_path.iterdir()) == []
 
 

@@ -1,13 +1,13 @@
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from rich.progress import Progress
 
+from er_il.datasets.dataset import Dataset
 from er_il.datasets.recipe import Recipe
-from er_il.datasets.record import Record, read_episodes, read_spec
+from er_il.datasets.record import DatasetRecord, read_episodes
 from er_il.datasets.recording import generate
 from er_il.envs.decoders import decoder
 from er_il.envs.tasks import task_id
@@ -15,7 +15,8 @@ from er_il.envs.wrapper import make_action_space_env
 from er_il.evaluation.replay import find_datasets, replay, replay_demo, write_report
 from er_il.support.errors import DatasetError
 
-RECIPE = replace(Recipe.load("reach_cup"), disturbance=0.0).resized(2)
+_UNSPECIFIED = {"codebase_version": "v3.0", "fps": 20, "total_frames": 1, "features": {"action": {"shape": [1]}}}
+RECIPE = Recipe.load("reach_cup").replaced(disturbance=0.0).resized(2)
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +28,7 @@ def datasets(tmp_path_factory):
 @pytest.mark.slow
 def test_joint_and_erj_repeat_the_demo_and_task_space_loses_the_elbow(datasets, tmp_path):
     seen = []
-    Record(RECIPE, {1: "collision"}).write(datasets["erj"])  # as if the leader had failed once
+    DatasetRecord(RECIPE, {1: "collision"}).write(datasets["erj"])  # as if the leader had failed once
     cells = replay(list(datasets.values()), 2, lambda path, name, done, total: seen.append((path.name, name, done)))
     by_name = {cell.decoder: cell for cell in cells}
     assert list(by_name) == ["joint", "task-nearest", "task-posture", "erj"]
@@ -66,7 +67,7 @@ def test_episodes_and_specification_come_back(datasets):
     for episode in episodes:
         assert episode.actions.shape == (len(episode.leader), 9)
         assert episode.leader.shape[1] == 8
-    assert read_spec(datasets["erj"])["space"] == "erj"
+    assert Dataset(datasets["erj"]).spec["space"] == "erj"
 
 
 def test_finding_datasets(datasets, monkeypatch):
@@ -87,6 +88,6 @@ def test_folders_that_are_no_dataset_of_ours(tmp_path):
     (tmp_path / "meta/info.json").write_text("{")
     with pytest.raises(DatasetError, match="not valid JSON"):
         replay([tmp_path], 1, lambda *args: None)
-    (tmp_path / "meta/info.json").write_text(json.dumps({"features": {"action": {"names": ["x"]}}}))
+    (tmp_path / "meta/info.json").write_text(json.dumps(_UNSPECIFIED))
     with pytest.raises(DatasetError, match="what its actions mean"):
         replay([Path(tmp_path)], 1, lambda *args: None)

@@ -1,7 +1,6 @@
 import json
 import sys
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -121,7 +120,7 @@ def test_from_demonstrations_to_a_rollout_with_the_stock_commands(
 @pytest.mark.slow
 @pytest.mark.usefixtures("one_thread")
 def test_from_images_to_a_rollout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    recipe = replace(Recipe.load("push_button_elbow").resized(2), cameras=("shoulder",), image_size=32)
+    recipe = Recipe.load("push_button_elbow").resized(2).replaced(cameras=("shoulder",), image_size=32)
     generate(recipe, ["erj"], tmp_path / "data", Progress(disable=True), workers=1)
     changes = {"dataset": tmp_path / "data" / "erj", "config": default_config("erj", "images_small")}
     stock, in_memory = (training(tmp_path, tmp_path / name, **changes) for name in ("stock", "in_memory"))

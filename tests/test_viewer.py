@@ -103,7 +103,7 @@ class Recorded:
 def shown(tmp_path_factory: pytest.TempPathFactory) -> SimpleNamespace:
     """An episode of a dataset, and its recording by ``er-il view``."""
     folder = tmp_path_factory.mktemp("viewer")
-    recipe = replace(Recipe.load(TASK).resized(2), cameras=(CAMERA,), image_size=48)
+    recipe = Recipe.load(TASK).resized(2).replaced(cameras=(CAMERA,), image_size=48)
     root = generate(recipe, ["erj"], folder / TASK, Progress(disable=True), workers=1).paths["erj"]
     dataset = LeRobotDataset("er_il/test", root=root, episodes=[EPISODE], video_backend="pyav")
     with pytest.MonkeyPatch.context() as patch:

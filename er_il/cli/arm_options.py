@@ -1,6 +1,6 @@
-"""What a user says about the arm of a dataset that does not know it, alike in every command that asks."""
+"""Options that describe the arm of a dataset without a specification, shared by all commands that need it."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -39,21 +39,12 @@ class ArmOptions:
     arms: Path | None = None
     """YAML file with one entry an arm, for several arms, in place of the options above."""
 
-    def wiring(self) -> "Wiring":
+    def wiring(self, redundant: tuple[str, ...] = (), angle_frames: tuple[str, ...] = ()) -> "Wiring":
         """The one arm that the options describe."""
         from er_il.datasets.wiring import Wiring
 
-        return Wiring(
-            self.arm,
-            ee_frame=self.ee_frame,
-            base_frame=self.base_frame,
-            urdf_joints=self.urdf_joints,
-            joints=self.joints,
-            state_joints=self.state_joints,
-            units=self.units,
-            signs=self.signs,
-            offsets=self.offsets,
-        )
+        own = {key: value for key, value in vars(self).items() if key != "arms"}
+        return Wiring(**own, redundant=redundant, angle_frames=angle_frames)
 
     def wirings(self, redundant: tuple[str, ...] = (), angle_frames: tuple[str, ...] = ()) -> "list[Wiring]":
         """All arms; none if nothing is said. Wrong options are told here, before seconds of imports.
@@ -70,6 +61,6 @@ class ArmOptions:
             return read_wirings(self.arms)
         if not self.arm:
             return []
-        wiring = replace(self.wiring(), redundant=redundant, angle_frames=angle_frames)
+        wiring = self.wiring(redundant, angle_frames)
         wiring.build_arm()
         return [wiring]

@@ -1,7 +1,6 @@
 """``er-il generate``: record demonstrations as LeRobot datasets."""
 
 from collections import Counter
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -45,7 +44,7 @@ def generate(
     if episodes is not None:
         recipe = recipe.resized(episodes)
     given = {"seed": seed, "arm": arm, "cameras": _split(cameras), "image_size": size}
-    recipe = replace(recipe, **{key: value for key, value in given.items() if value is not None})
+    recipe = recipe.replaced(**{key: value for key, value in given.items() if value is not None})
     from er_il.datasets.recording import (
         generate as generate_datasets,  # seconds of imports: wrong options are told before
     )

@@ -80,8 +80,8 @@ def verify(dataset: Positional[str], *, out: Path | None = None) -> None:
     path = target / "report.json"
     path.write_text(json.dumps({"meta": provenance() | {"dataset": dataset}} | report, indent=2))
     console.print(f"{path}\n{target / 'round_trip.png'}", highlight=False, soft_wrap=True)
-    if verification.suspicions:
-        raise DatasetError(" ".join(f"{label}: {text}" for label, text in verification.suspicions.items()))
+    if verification.findings:
+        raise DatasetError(" ".join(f"{label}: {text}" for label, text in verification.findings.items()))
 
 
 def _numbers(percentiles: dict[str, float] | None, *chosen: str) -> str:

@@ -1,4 +1,4 @@
-"""What a re-encoded dataset says about itself: provenance for programs, a section of its card for people."""
+"""Provenance of a re-encoded dataset: ``meta/er_il.json`` for programs, a section of its card for people."""
 
 import json
 import re
@@ -6,38 +6,52 @@ from pathlib import Path
 from typing import Any
 
 from lerobot.datasets import create_lerobot_dataset_card
-from lerobot.datasets.utils import DatasetInfo
+from lerobot.datasets.io_utils import load_info
 
-from er_il.spaces.layout import Layout
+from er_il.datasets.dataset import Dataset
+from er_il.spaces.joint import JOINT
+from er_il.spaces.layout import Layout, Part
 from er_il.support.provenance import provenance
 
 HISTORY = Path("meta/er_il.json")
 CARD = Path("README.md")
+
+_MEANINGS = {  # of an arm's commands, by name
+    r"ee\.[xyz]": "end-effector position [m]",
+    r"ee\.q[xyzw]": "end-effector orientation, unit quaternion",
+    r"ee\.r\d\d": "end-effector orientation, element of the rotation matrix",
+    r"ee\.d[xyz]": "change of the end-effector position [m]",
+    r"ee\.dr[xyz]": "change of the end-effector orientation, rotation vector [rad]",
+    r".*\.delta": "change of the redundancy [rad]",
+    r".*": "redundancy [rad]",
+}
+
 _START, _END = "<!-- er_il: start -->", "<!-- er_il: end -->"
 
 
-def sign(dataset: Path, info: DatasetInfo, layout: Layout, source: str, options: dict[str, Any]) -> None:
+def sign(dataset: Dataset, source: str, options: dict[str, Any]) -> None:
     """Write where a dataset comes from and what its actions mean into its metadata and card.
 
     Args:
-        dataset: Its folder.
-        info: Its metadata.
-        layout: How its actions are encoded.
+        dataset: The dataset; it says what its actions mean.
         source: The dataset it was made from, its name or repository id.
         options: What else was asked for, as JSON.
     """
-    path = dataset / HISTORY
+    path = dataset.root / HISTORY
     history: list[Any] = json.loads(path.read_text()) if path.exists() else []
     made = {key: value for key, value in provenance().items() if key != "machine"}
     path.write_text(json.dumps([*history, {"source": source, **options, **made}], indent=2))
-    card = dataset / CARD
+    card = dataset.root / CARD
+    info = load_info(dataset.root)
     text = card.read_text() if card.exists() else str(create_lerobot_dataset_card(dataset_info=info))
     text = re.sub(f"\n*{_START}.*{_END}\n*", "\n", text, flags=re.DOTALL)
-    card.write_text(f"{text.rstrip()}\n\n{_START}\n{_section(layout, source)}\n{_END}\n")
+    card.write_text(f"{text.rstrip()}\n\n{_START}\n{_section(dataset.layout, source)}\n{_END}\n")
 
 
 def _section(layout: Layout, source: str) -> str:
-    rows = [f"| {index} | `{name}` | {_meaning(layout, name)} |" for index, name in enumerate(layout.encoded_names)]
+    rows = [
+        f"| {index} | `{name}` | {dimension_meaning(layout, name)} |" for index, name in enumerate(layout.encoded_names)
+    ]
     arms = [
         f"- {part.label or 'arm'}: {part.space.arm.name}, pose of `{part.space.arm.ee_frame}` in "
         f"`{part.space.arm.base_frame}`, joints {', '.join(f'`{joint}`' for joint in part.motors.joints)} "
@@ -61,16 +75,19 @@ def _section(layout: Layout, source: str) -> str:
     )
 
 
-def _meaning(layout: Layout, name: str) -> str:
+def dimension_meaning(layout: Layout, name: str) -> str:
+    """Describe a dimension of the encoded vector, with its unit."""
     for part in layout.parts:
-        if name in part.motors.joints and name in layout.names:
+        if layout.kind == JOINT and name in part.motors.joints:
             joint = part.space.arm.joints[part.motors.joints.index(name)]
             return f"joint `{joint}` [{part.motors.units}]"
-        if name in part.names:
-            own = part.space.names[part.names.index(name)]
-            if own in ("ee.x", "ee.y", "ee.z", "ee.dx", "ee.dy", "ee.dz"):
-                return "end-effector position [m]"
-            if own.startswith("ee.q"):
-                return "end-effector orientation, unit quaternion"
-            return "end-effector orientation" if own.startswith("ee.") else "redundancy [rad]"
+        if layout.kind != JOINT and name in part.names:
+            return _meaning(part, name.removeprefix(f"{part.label}_"))
     return "as in the source"
+
+
+def _meaning(part: Part, command: str) -> str:
+    joint, _, kind = command.rpartition(".")
+    if joint in part.space.arm.joints:
+        return f"{'change of joint' if kind == 'delta' else 'joint'} `{joint}` [rad]"
+    return next(meaning for pattern, meaning in _MEANINGS.items() if re.fullmatch(pattern, command))

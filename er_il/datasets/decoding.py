@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from er_il.datasets.dataset import Dataset
 from er_il.kinematics.solver import Status
 from er_il.spaces.layout import Layout
 from er_il.spaces.pose import PoseSpace
+from er_il.spaces.spec import ACTION
 from er_il.support.workers import worker_pool
 
 Array = NDArray[np.float64]
@@ -19,8 +21,8 @@ FEW_FRAMES = 4000  # fewer are decoded sooner than worker processes start
 
 
 @dataclass(frozen=True, eq=False)
-class Episode:
-    """T encoded vectors, and what is known about the joints meanwhile."""
+class EncodedEpisode:
+    """T encoded vectors, with the joint vectors of the same steps where they are known."""
 
     number: int
     actions: Array  # (T, layout's encoded dimensions)
@@ -30,7 +32,7 @@ class Episode:
 
 @dataclass(frozen=True, eq=False)
 class DecodedEpisode:
-    """What became of an episode of T vectors for P arms."""
+    """T decoded vectors of P arms, and the quality of each decode."""
 
     vectors: Array  # (T, D)
     status: NDArray[np.str_]  # (T, P) of er_il.Status
@@ -39,7 +41,7 @@ class DecodedEpisode:
     conditioning: Array  # (T, P) smallest singular value, see Kinematics.conditioning; infinite in joint space
 
 
-def decode_episode(layout: Layout, episode: Episode) -> DecodedEpisode:
+def decode_episode(layout: Layout, episode: EncodedEpisode) -> DecodedEpisode:
     """Decode an episode in time order.
 
     Seeds are the measured joints, as on a robot; without them the joint vector of the step before.
@@ -68,7 +70,10 @@ def decode_episode(layout: Layout, episode: Episode) -> DecodedEpisode:
 
 
 def decode_episodes(
-    layout: Layout, episodes: Sequence[Episode], workers: int, advance: Callable[[int], object] = lambda frames: None
+    layout: Layout,
+    episodes: Sequence[EncodedEpisode],
+    workers: int,
+    advance: Callable[[int], object] = lambda frames: None,
 ) -> list[DecodedEpisode]:
     """Decode episodes, in worker processes if they are long; ``advance`` is told how many frames are done."""
     frames = sum(len(episode.actions) for episode in episodes)
@@ -79,6 +84,22 @@ def decode_episodes(
     return decoded
 
 
+def read_encoded_episodes(dataset: Dataset, layout: Layout, truth: str | None = None) -> list[EncodedEpisode]:
+    """Read the episodes of a dataset: actions, measured joints, and the column ``truth`` of joint vectors, if any."""
+    actions = dataset.vectors(ACTION).astype(np.float64)
+    state = dataset.measured_joints(layout)
+    vectors = None if truth is None else dataset.vectors(truth).astype(np.float64)
+    return [
+        EncodedEpisode(
+            number,
+            actions[rows],
+            state=None if state is None else state[rows],
+            truth=None if vectors is None else vectors[rows],
+        )
+        for number, rows in dataset.episodes.items()
+    ]
+
+
 def home_vector(layout: Layout) -> Array:
     """The joint vector (D,) of all arms at home, zero elsewhere."""
     vector = np.zeros(len(layout.names))
@@ -87,7 +108,7 @@ def home_vector(layout: Layout) -> Array:
     return vector
 
 
-def _results(layout: Layout, episodes: Sequence[Episode], workers: int) -> Iterator[DecodedEpisode]:
+def _results(layout: Layout, episodes: Sequence[EncodedEpisode], workers: int) -> Iterator[DecodedEpisode]:
     if workers <= 1:
         yield from map(functools.partial(decode_episode, layout), episodes)
     else:
@@ -103,6 +124,6 @@ def _prepare(spec: Mapping[str, Any]) -> None:
     _layout = Layout.from_spec(spec)
 
 
-def _decode(episode: Episode) -> DecodedEpisode:
+def _decode(episode: EncodedEpisode) -> DecodedEpisode:
     assert _layout is not None
     return decode_episode(_layout, episode)

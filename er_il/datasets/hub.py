@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import httpx
-from lerobot.datasets import LeRobotDataset
 
 from er_il.support.errors import DatasetError
 
@@ -20,6 +19,8 @@ def find_dataset(source: str) -> Path:
     folder = Path(source)
     if folder.exists() or folder.is_absolute() or source.count("/") != 1:
         return folder  # whoever reads it says what is wrong with it
+    from lerobot.datasets import LeRobotDataset  # seconds of imports that a folder does without
+
     try:
         return Path(LeRobotDataset(source, video_backend="pyav").root)
     # huggingface_hub's own errors are OSErrors and ValueErrors; without a network, its client's come through.

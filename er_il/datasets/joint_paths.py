@@ -5,32 +5,30 @@ from pathlib import Path
 
 import numpy as np
 
-from er_il.datasets.decoding import decode_episodes
-from er_il.datasets.encoding import dataset_info, dataset_layout, joints_column, read_episodes
+from er_il.datasets.dataset import Dataset
+from er_il.datasets.decoding import decode_episodes, read_encoded_episodes
 from er_il.datasets.joint_path import ArmPaths, JointPath
 from er_il.datasets.wiring import Wiring, wire
-from er_il.spaces.spec import ACTION, SPEC
 from er_il.support.errors import DatasetError
 
 
-def read_joint_paths(dataset: Path, wirings: Sequence[Wiring] = (), workers: int = 1) -> list[ArmPaths]:
+def read_joint_paths(root: Path, wirings: Sequence[Wiring] = (), workers: int = 1) -> list[ArmPaths]:
     """Read the joint angles of each arm of a dataset.
 
     Args:
-        dataset: Folder of the dataset.
+        root: Folder of the dataset.
         wirings: The arms of a dataset that does not know them.
         workers: Processes that decode, where the joints were not kept beside the encoded actions.
 
     Raises:
         ErIlError: it is no dataset, or does not say which arm it is of and nor do the wirings.
     """
-    info = dataset_info(dataset)
-    described = SPEC in (info.features[ACTION].get("info") or {})
-    if not described and not wirings:
-        raise DatasetError(f"{dataset} does not say which arm it is of: give --arm, and --joints for its joints.")
-    layout = dataset_layout(info.features) if described else wire(wirings, info.features, "joint", "quat")
-    truth = joints_column(info.features, layout)
-    episodes = read_episodes(dataset, info, layout, truth)
+    dataset = Dataset(root)
+    if not dataset.specified and not wirings:
+        raise DatasetError(f"{root} does not say which arm it is of: give --arm, and --joints for its joints.")
+    layout = dataset.layout if dataset.specified else wire(wirings, dataset.features, "joint", "quat")
+    truth = dataset.joints_column(layout)
+    episodes = read_encoded_episodes(dataset, layout, truth)
     if truth is None:
         vectors = [decoded.vectors for decoded in decode_episodes(layout, episodes, workers)]
     else:

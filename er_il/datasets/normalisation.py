@@ -1,23 +1,25 @@
-"""Scales by which policies see the world and are corrected: fit to what matters, not to what moves most."""
+"""Statistics by which policies normalise observations and actions, bounded so that noise is not amplified."""
 
 from pathlib import Path
 
 import numpy as np
 from lerobot.datasets import write_stats
-from lerobot.datasets.io_utils import load_info, load_stats
+from lerobot.datasets.io_utils import load_stats
 
-from er_il.datasets.rewriting import episode_slices, read_episode_numbers, read_vectors
-from er_il.datasets.schema import ENVIRONMENT_STATE, STATE, dimension_names
+from er_il.datasets.dataset import Dataset
+from er_il.datasets.schema import ENVIRONMENT_STATE, STATE
 from er_il.kinematics.rotation import Quaternion, Rot6d
 from er_il.spaces.spec import ACTION
+
+Stats = dict[str, dict[str, np.ndarray]]
 
 MARGIN = 0.025  # [m], or of a quaternion's component (2.9 degrees), around where objects start
 LEAST_DEVIATION = 0.02  # [rad], [m], or of a quaternion's component, of the robot's state
 LEAST_ROTATION = 0.05  # of a component of an action's rotation (a quaternion's: 5.7 degrees)
 
 
-def set_scales(root: Path) -> None:
-    """Set the statistics by which ``configs/`` normalise what a policy sees.
+def normalise_observations(root: Path) -> None:
+    """Set the statistics by which ``configs/`` normalise object poses and the robot's state.
 
     Object poses are scaled to a range. It becomes that of the episodes' starts, and a margin. The range of
     whole episodes would not do: an object that is carried across the scene has a large one, in which the
@@ -31,15 +33,16 @@ def set_scales(root: Path) -> None:
         root: Folder of the dataset; its episodes' own statistics stay what they were.
     """
     stats = load_stats(root) or {}
-    poses = read_vectors(root, ENVIRONMENT_STATE)
-    starts = poses[[episode.start for episode in episode_slices(read_episode_numbers(root))]].astype(np.float64)
+    dataset = Dataset(root)
+    poses = dataset.vectors(ENVIRONMENT_STATE)
+    starts = poses[[rows.start for rows in dataset.episodes.values()]].astype(np.float64)
     stats[ENVIRONMENT_STATE] |= {"min": starts.min(axis=0) - MARGIN, "max": starts.max(axis=0) + MARGIN}
     stats[STATE] |= {"std": np.maximum(stats[STATE]["std"], LEAST_DEVIATION)}
-    write_stats(stats, root)
+    _write(stats, root)
 
 
-def loosen_rotations(root: Path) -> None:
-    """Set the statistics by which ``configs/`` normalise the rotations in what a policy does.
+def bound_rotation_deviation(root: Path) -> None:
+    """Set a lower bound on the standard deviation by which ``configs/`` normalise the rotations of actions.
 
     Actions are scaled by their standard deviation, and a policy's errors count by it. Where the hand keeps its
     orientation to half a degree, four of ERJ's nine numbers would be held to a fraction of that, at the cost of where
@@ -49,7 +52,12 @@ def loosen_rotations(root: Path) -> None:
         root: Folder of the dataset; its episodes' own statistics stay what they were.
     """
     stats = load_stats(root) or {}
-    names = dimension_names(load_info(root).features[ACTION])
+    names = Dataset(root).names(ACTION)
     rotations = np.array([name.endswith((*Quaternion.names, *Rot6d.names)) for name in names])  # of any arm
     stats[ACTION] |= {"std": np.maximum(stats[ACTION]["std"], LEAST_ROTATION * rotations)}
-    write_stats(stats, root)
+    _write(stats, root)
+
+
+def _write(stats: Stats, root: Path) -> None:
+    """Write statistics in alphabetical order: LeRobot's own order differs from run to run."""
+    write_stats({feature: dict(sorted(stats[feature].items())) for feature in sorted(stats)}, root)

@@ -1,13 +1,13 @@
 """The recipe of a dataset: everything that decides what ``er-il generate`` records."""
 
-import dataclasses
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
 from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Self
 
-from er_il.support.declaration import keys_of, read_declaration
+from pydantic import Field, StrictFloat, StrictInt, StrictStr, field_validator, model_validator
+
+from er_il.support.declaration import Declaration, declared, read_declaration
 from er_il.support.errors import DatasetError, UnknownNameError
 from er_il.support.resources import data_dir
 
@@ -22,44 +22,38 @@ TRAIN, VALIDATION = "train", "validation"
 SUFFIX = ".yaml"
 
 
-@dataclass(frozen=True)
-class Recipe:
-    """What to record: a task, how often, what the cameras see, and how the world varies.
+class Recipe(Declaration):
+    """Declaration of a dataset: a task, the number of demonstrations, the cameras, and the randomisation of the world.
 
-    Raises:
-        DatasetError: a value that no dataset can have.
+    Build it by :meth:`from_dict` or :meth:`replaced`, which refuse wrong values with a DatasetError.
     """
 
-    task: str
-    episodes: int  # successful demos, the validation episodes included
-    validation: int  # the last episodes, held out from training
-    seed: int = 0
-    arm: str = "panda"
-    cameras: tuple[str, ...] = ()  # recorded as videos; none: state only
-    image_size: int = 96  # [px] width and height of every camera
-    disturbance: float = 0.0  # [rad] by which the follower is pushed off the leader's way (er_il.datasets.disturbance)
-    randomisation: Mapping[str, Any] = field(default_factory=dict)  # keyword arguments of the environment
+    task: StrictStr
+    episodes: Annotated[StrictInt, Field(ge=1, le=DEMOS_PER_SEED)]  # successful demos, with those for validation
+    validation: Annotated[StrictInt, Field(ge=0)]  # the last episodes, held out from training
+    seed: Annotated[StrictInt, Field(ge=0)] = 0
+    arm: StrictStr = "panda"
+    cameras: tuple[StrictStr, ...] = ()  # recorded as videos; none: state only
+    image_size: Annotated[StrictInt, Field(ge=16, multiple_of=2)] = 96  # [px] width and height; videos need it even
+    # [rad] by which the follower is pushed off the leader's way (er_il.datasets.disturbance)
+    disturbance: Annotated[StrictInt | StrictFloat, Field(ge=0, lt=LARGEST_DISTURBANCE)] = 0.0
+    randomisation: Mapping[StrictStr, Any] = Field(default_factory=dict)  # keyword arguments of the environment
 
-    def __post_init__(self) -> None:
-        if self.episodes < 1:
-            raise DatasetError(f"A dataset needs at least one episode, not {self.episodes}.")
-        if not 0 <= self.validation < self.episodes:
-            raise DatasetError(
+    @field_validator("cameras")
+    @classmethod
+    def _differ(cls, cameras: tuple[str, ...]) -> tuple[str, ...]:
+        if len(set(cameras)) != len(cameras):
+            raise ValueError("A camera is named twice")
+        return cameras
+
+    @model_validator(mode="after")
+    def _leaves_training_episodes(self) -> Self:
+        if self.validation >= self.episodes:
+            raise ValueError(
                 f"{self.validation} of {self.episodes} episodes cannot be held out for validation: "
-                "at least one must be left to train on."
+                "at least one must be left to train on"
             )
-        if self.seed < 0:
-            raise DatasetError(f"The seed is {self.seed}; it must not be negative.")
-        if not 0 <= self.disturbance < LARGEST_DISTURBANCE:
-            raise DatasetError(f"The disturbance is {self.disturbance}; it must be in [0, {LARGEST_DISTURBANCE}) rad.")
-        if self.episodes > DEMOS_PER_SEED:
-            raise DatasetError(f"A seed is good for {DEMOS_PER_SEED} demos, fewer than {self.episodes}.")
-        if self.image_size < 16 or self.image_size % 2:
-            raise DatasetError(
-                f"The image size is {self.image_size}; videos need an even number of at least 16 pixels."
-            )
-        if len(set(self.cameras)) != len(self.cameras):
-            raise DatasetError(f"A camera is named twice in {', '.join(self.cameras)}.")
+        return self
 
     @classmethod
     def load(cls, task: str, arm: str | None = None) -> "Recipe":
@@ -77,7 +71,7 @@ class Recipe:
         if task not in recipe_names():
             raise UnknownNameError("task", task, recipe_names())
         recipe = cls.from_file(path)
-        return recipe if arm is None else dataclasses.replace(recipe, arm=arm)
+        return recipe if arm is None else recipe.replaced(arm=arm)
 
     @classmethod
     def from_file(cls, path: Path) -> "Recipe":
@@ -95,28 +89,24 @@ class Recipe:
         Raises:
             DatasetError: keys are missing, unknown, or of the wrong type.
         """
-        values = keys_of(cls, values, "recipe", DatasetError)
-        arguments = dict(values)
-        arguments["cameras"] = _names(values.get("cameras", ()))
-        for name, kind in [("task", str), ("arm", str), ("randomisation", Mapping)]:
-            if name in values and not isinstance(values[name], kind):
-                raise DatasetError(f"{name} is {values[name]!r}, not a {'mapping' if kind is Mapping else 'name'}.")
-        for name in ("episodes", "validation", "seed", "image_size"):
-            if name in values and (not isinstance(values[name], int) or isinstance(values[name], bool)):
-                raise DatasetError(f"{name} is {values[name]!r}, not a whole number.")
-        disturbance = values.get("disturbance", 0.0)
-        if not isinstance(disturbance, int | float) or isinstance(disturbance, bool):
-            raise DatasetError(f"disturbance is {disturbance!r}, not a number.")
-        return cls(**arguments)
+        return declared(cls, values, "recipe", DatasetError)
+
+    def replaced(self, **changes: Any) -> "Recipe":
+        """Return the recipe with other values for some keys.
+
+        Raises:
+            DatasetError: a key is unknown, or a value is none that it can have.
+        """
+        return self.from_dict(dict(self) | changes)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON or YAML."""
-        return dataclasses.asdict(self) | {"cameras": list(self.cameras), "randomisation": dict(self.randomisation)}
+        return self.model_dump(mode="json")
 
     def resized(self, episodes: int) -> "Recipe":
         """Return the recipe for another number of episodes, the same share of them held out (rounded up)."""
         share = -(-episodes * self.validation // self.episodes)
-        return dataclasses.replace(self, episodes=episodes, validation=max(0, min(share, episodes - 1)))
+        return self.replaced(episodes=episodes, validation=max(0, min(share, episodes - 1)))
 
     def differences(self, other: "Recipe") -> str:
         """Name what differs from another recipe, as ``key: ours instead of theirs``; "" if nothing does."""
@@ -148,9 +138,3 @@ class Recipe:
 def recipe_names() -> tuple[str, ...]:
     """Tasks that have a shipped recipe, in alphabetical order."""
     return tuple(sorted(path.stem for path in data_dir("datasets").glob(f"*{SUFFIX}")))
-
-
-def _names(values: object) -> tuple[str, ...]:
-    if isinstance(values, str) or not isinstance(values, Iterable):
-        raise DatasetError(f"cameras is {values!r}, not a list of names.")
-    return tuple(str(name) for name in values)

@@ -1,7 +1,6 @@
 """Generating datasets: demos are recorded once and written as one LeRobot v3 dataset a space."""
 
 import errno
-import json
 import os
 import shutil
 from collections.abc import Iterator, Sequence
@@ -19,20 +18,24 @@ from lerobot.utils.utils import SuppressProgressBars
 from rich.progress import Progress
 
 from er_il.arms.arm import Arm
+from er_il.datasets.dataset import Dataset, datasets_in
 from er_il.datasets.demos import Demo, collect, demo_path, make_world
 from er_il.datasets.encoding import encode_dataset
-from er_il.datasets.normalisation import loosen_rotations, set_scales
+from er_il.datasets.normalisation import bound_rotation_deviation, normalise_observations
 from er_il.datasets.recipe import Recipe
-from er_il.datasets.record import Record
+from er_il.datasets.record import DatasetRecord
 from er_il.datasets.schema import DEMO_SEED, ENVIRONMENT_STATE, IMAGES, LEADER_JOINTS, STATE, features
 from er_il.spaces.base import ArmSpace
 from er_il.spaces.layout import Layout
 from er_il.spaces.registry import check_space, make_arm_space
 from er_il.spaces.spec import ACTION
+from er_il.support.atomic_files import work_folder, write_json
 from er_il.support.errors import DatasetError
 
 # LeRobot's encoder drops frames when its queue is full, as a live camera's must be; ours can wait.
 _QUEUE_SIZE = 1_000_000
+
+_DEMOS, _DATASET, _RECIPE = "demos", "dataset", "recipe.json"  # in the folder of an unfinished run
 
 
 @dataclass(frozen=True)
@@ -47,8 +50,8 @@ class Generated:
 def generate(recipe: Recipe, spaces: Sequence[str], out: Path, progress: Progress, workers: int) -> Generated:
     """Record a recipe's demos and write one dataset a space into ``out``.
 
-    Interrupted at any point, the same call resumes. Datasets that exist are left alone; only what
-    is missing is added.
+    Interrupted at any point, the same call resumes, one process at a time. Datasets that exist are left
+    alone; only what is missing is added.
 
     Args:
         recipe: What to record.
@@ -60,37 +63,39 @@ def generate(recipe: Recipe, spaces: Sequence[str], out: Path, progress: Progres
     Raises:
         UnknownNameError: unknown task, space, arm or camera.
         DatasetError: another recipe's data is there, most demos fail, or the folder cannot be written.
+        ErIlError: another process writes there.
     """
     asked = tuple(dict.fromkeys(spaces))
     for space in asked or ("",):
         check_space(space)
         make_arm_space(space, Arm.preset(recipe.arm))  # raises if the arm has none such
-    datasets = {info.parents[1].name for info in out.glob("*/meta/info.json")}
-    existing = sorted(datasets | {space for space in asked if (out / space).exists()})
-    for space in existing:
-        _check_same(recipe, Record.read(out / space).recipe, out / space)
-    new = tuple(space for space in asked if space not in existing)
-    work = out.with_name(out.name + ".partial")
-    with _writing_to(out), SuppressProgressBars():
-        first = out / (existing or new)[0]
-        if not existing:
-            _record(recipe, new[0], first, work, progress, workers)
+    with _writing_to(out), SuppressProgressBars(), work_folder(out) as work:
+        there = {path.name for path in datasets_in(out)} | {space for space in asked if (out / space).exists()}
+        for space in sorted(there):
+            _check_same(recipe, DatasetRecord.read(out / space).recipe, out / space)
+        new = tuple(space for space in asked if space not in there)
+        first = out / min(there, default=asked[0])
+        if not there:
+            _record(recipe, first, work, progress, workers)
         if missing := [space for space in new if out / space != first]:
             for space in progress.track(missing, description="Encode in the other spaces"):
-                encode_dataset(first, out / space, Layout.of_space(make_arm_space(space, Arm.preset(recipe.arm))))
-        shutil.rmtree(work, ignore_errors=True)
-    return Generated({space: out / space for space in asked}, new, Record.read(first).dropped)
+                layout = Layout.of_space(make_arm_space(space, Arm.preset(recipe.arm)))
+                encode_dataset(Dataset(first), out / space, layout)
+        for leftover in (work / _DEMOS, work / _DATASET):
+            shutil.rmtree(leftover, ignore_errors=True)
+        (work / _RECIPE).unlink(missing_ok=True)
+    return Generated({space: out / space for space in asked}, new, DatasetRecord.read(first).dropped)
 
 
-def _record(recipe: Recipe, kind: str, target: Path, work: Path, progress: Progress, workers: int) -> None:
+def _record(recipe: Recipe, target: Path, work: Path, progress: Progress, workers: int) -> None:
     """Collect the demos and write the first dataset from them."""
     world = make_world(recipe)
     try:
         world.reset(seed=0)  # what cannot be rendered shows here, not in a worker
-        space = make_arm_space(kind, Arm.preset(recipe.arm))
+        space = make_arm_space(target.name, Arm.preset(recipe.arm))
         dropped: dict[int, str] = {}
         demos = _claim(work, recipe)
-        writer = _Writer(recipe, world, space, work / "dataset")
+        writer = _Writer(recipe, world, space, work / _DATASET)
         bar = progress.add_task(f"Record {recipe.task}", total=recipe.episodes)
         for seed, reason in collect(recipe, demos, workers):
             if reason:
@@ -103,7 +108,7 @@ def _record(recipe: Recipe, kind: str, target: Path, work: Path, progress: Progr
     finally:
         world.close()
     target.parent.mkdir(parents=True, exist_ok=True)
-    (work / "dataset").rename(target)
+    (work / _DATASET).rename(target)
 
 
 class _Writer:
@@ -153,18 +158,18 @@ class _Writer:
         info = self._dataset.meta.info
         info.splits = self._recipe.splits
         write_info(info, self._dataset.root)
-        set_scales(self._dataset.root)
-        loosen_rotations(self._dataset.root)
-        Record(self._recipe, dropped).write(self._dataset.root)
+        normalise_observations(self._dataset.root)
+        bound_rotation_deviation(self._dataset.root)
+        DatasetRecord(self._recipe, dropped).write(self._dataset.root)
 
 
 def _claim(work: Path, recipe: Recipe) -> Path:
     """Return the folder of finished demos, which belongs to one recipe."""
-    demos, owner = work / "demos", work / "recipe.json"
+    demos, owner = work / _DEMOS, work / _RECIPE
     if owner.exists():
         _check_same(recipe, Recipe.from_file(owner), work)
-    demos.mkdir(parents=True, exist_ok=True)
-    owner.write_text(json.dumps(recipe.to_dict()))
+    demos.mkdir(exist_ok=True)
+    write_json(owner, recipe.to_dict())
     return demos
 
 

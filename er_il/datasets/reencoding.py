@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from er_il.datasets import card
-from er_il.datasets.encoding import dataset_info, dataset_layout, decode_dataset, encode_dataset, joints_column
+from er_il.datasets.dataset import Dataset
+from er_il.datasets.encoding import decode_dataset, encode_dataset
 from er_il.datasets.hub import find_dataset
 from er_il.datasets.wiring import Wiring, wire
 from er_il.spaces.joint import JOINT
 from er_il.spaces.layout import Layout
-from er_il.spaces.spec import ACTION, SPEC
 from er_il.support.errors import DatasetError
 
 
@@ -52,36 +52,33 @@ def reencode(
         ErIlError: the dataset, the arms or the space do not fit.
         FileExistsError: the target exists.
     """
-    folder = find_dataset(source)
-    info = dataset_info(folder)
-    described = SPEC in (info.features[ACTION].get("info") or {})
-    if described and wirings:
+    dataset = Dataset(find_dataset(source))
+    if dataset.specified and wirings:
         raise DatasetError(f"{source} says which arms it is of: leave out --arm and --arms.")
-    if not described and not wirings:
+    if not dataset.specified and not wirings:
         raise DatasetError(f"{source} does not say which arm it is of: give --arm, and --joints for its joints.")
-    if described:
-        layout = dataset_layout(info.features).in_space(kind, rotation)
+    if dataset.specified:
+        layout = dataset.layout.in_space(kind, rotation)
     else:
-        layout = wire(wirings, info.features, kind, rotation)
-    encoded = described and info.features[ACTION]["info"][SPEC]["space"] != JOINT
-    decode = encoded and (kind == JOINT or joints_column(info.features, layout) is None)
-    done, total = 0, info.total_frames
+        layout = wire(wirings, dataset.features, kind, rotation)
+    encoded = dataset.specified and dataset.spec["space"] != JOINT
+    decode = encoded and (kind == JOINT or dataset.joints_column(layout) is None)
+    done = 0
 
     def advance(frames: int) -> None:
         nonlocal done
         done += frames
-        on_progress(done, total)
+        on_progress(done, dataset.frames)
 
     def finish(partial: Path) -> None:
-        written = dataset_info(partial)
         options: dict[str, Any] = {"to": kind, "rotation": rotation, "decoded": decode}
-        name = folder.resolve().name if Path(source).exists() else source  # not where it lies on this machine
-        card.sign(partial, written, dataset_layout(written.features), name, options)
+        # A folder is named without its place on this machine.
+        card.sign(Dataset(partial), dataset.root.resolve().name if Path(source).exists() else source, options)
 
     statuses: Counter[str] = Counter()
     if decode:
-        decoded = decode_dataset(folder, target, layout, finish=finish, advance=advance)
+        decoded = decode_dataset(dataset, target, layout, finish=finish, advance=advance)
         statuses.update(status for episode in decoded for status in episode.status.ravel().tolist())
     else:
-        encode_dataset(folder, target, layout, keep=keep, fit=True, finish=finish, advance=advance)
-    return Reencoded(dataset_layout(dataset_info(target).features), statuses)
+        encode_dataset(dataset, target, layout, keep=keep, fit=True, finish=finish, advance=advance)
+    return Reencoded(Dataset(target).layout, statuses)

@@ -1,34 +1,37 @@
-"""Rewriting: a LeRobot v3 dataset again with other vectors in some columns, and all else as it is."""
+"""Writing a copy of a LeRobot v3 dataset in which some columns of vectors are replaced or added."""
 
 import functools
 import os
 import shutil
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from lerobot.datasets import DEFAULT_EPISODES_PATH, aggregate_stats, write_stats
+from lerobot.datasets import aggregate_stats, write_stats
 from lerobot.datasets.compute_stats import compute_episode_stats
 from lerobot.datasets.feature_utils import get_hf_features_from_features
-from lerobot.datasets.io_utils import load_stats, write_info, write_table_one_row_group_per_episode
-from lerobot.datasets.utils import DatasetInfo
+from lerobot.datasets.io_utils import load_info, load_stats, write_info, write_table_one_row_group_per_episode
 from numpy.typing import NDArray
 
+from er_il.datasets.dataset import (
+    DATA,
+    EPISODE,
+    EPISODES,
+    Dataset,
+    Floats,
+    episode_slices,
+    parquet_files,
+    read_table,
+)
 from er_il.datasets.schema import Feature
-from er_il.support.errors import DatasetError
 
-Floats = NDArray[np.float32]
 Stats = dict[str, dict[str, NDArray[Any]]]
 Advance = Callable[[int], object]  # called with the number of frames done since the last call
 
-EPISODE = "episode_index"
-_EPISODES = Path(DEFAULT_EPISODES_PATH).parts[:2]  # meta/episodes
-_VIDEOS, _DATA = "videos", "data"
+_VIDEOS = "videos"
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,62 +42,9 @@ class Column:
     values: Floats  # (N, dim), a row a frame, in the order of the data's files
 
 
-def read_vectors(dataset: Path, column: str) -> Floats:
-    """Read a column of vectors (N, dim), a row a frame, in the order of the data's files."""
-    return np.concatenate([_vectors(_read(path, column), column) for path in data_files(dataset)])
-
-
-def read_episode_numbers(dataset: Path) -> NDArray[np.int64]:
-    """Read the episode (N,) of each frame, in the order of the data's files."""
-    return np.concatenate([_read(path, EPISODE).column(EPISODE).to_numpy() for path in data_files(dataset)])
-
-
-def _read(path: Path, *columns: str) -> pa.Table:
-    """Read a file's columns, all by default.
-
-    Raises:
-        DatasetError: the file is not whole, as LeRobot leaves it when a recording is killed.
-    """
-    try:
-        return pq.read_table(path, columns=list(columns) or None)
-    except pa.ArrowInvalid as error:
-        raise DatasetError(f"{path} is damaged, as by a recording that was killed: {error}") from error
-
-
-def episode_slices(numbers: NDArray[np.int64]) -> list[slice]:
-    """The frames of each episode, from the episode (N,) of each frame."""
-    starts = np.flatnonzero(np.diff(numbers, prepend=-1)).tolist()
-    return [slice(start, stop) for start, stop in zip(starts, [*starts[1:], len(numbers)], strict=True)]
-
-
-def data_files(dataset: Path) -> list[Path]:
-    """The files that hold the frames, in order."""
-    return _parquet_files(dataset / _DATA)
-
-
-@contextmanager
-def appearing(target: Path) -> Iterator[Path]:
-    """Yield a folder that takes the target's name once the block is through, and is gone if it fails.
-
-    Raises:
-        FileExistsError: the target exists.
-    """
-    if target.exists():
-        raise FileExistsError(17, "The target exists already", str(target))
-    partial = target.with_name(target.name + ".partial")
-    shutil.rmtree(partial, ignore_errors=True)
-    partial.parent.mkdir(parents=True, exist_ok=True)
-    try:
-        yield partial
-        partial.rename(target)
-    finally:
-        shutil.rmtree(partial, ignore_errors=True)
-
-
 def rewrite(
-    source: Path,
+    source: Dataset,
     target: Path,
-    info: DatasetInfo,
     columns: Mapping[str, Column],
     advance: Advance = lambda frames: None,
 ) -> None:
@@ -104,19 +54,19 @@ def rewrite(
     stays. Videos are hard links where the file system allows.
 
     Args:
-        source: Folder of the dataset.
+        source: The dataset.
         target: Folder that does not exist.
-        info: The source's metadata.
         columns: Columns of the target that the source lacks or has otherwise.
         advance: Told about progress.
     """
+    info = load_info(source.root)
     info.features |= {name: column.feature for name, column in columns.items()}
-    _copy(source, target)
+    _copy(source.root, target)
     schema = get_hf_features_from_features(info.features).arrow_schema
     stats: dict[int, Stats] = {}
     done = 0
-    for path in data_files(source):
-        table = _read(path)
+    for path in source.data_files:
+        table = read_table(path)
         rows = slice(done, done + len(table))
         done = rows.stop
         values = {name: column.values[rows] for name, column in columns.items()}
@@ -124,20 +74,15 @@ def rewrite(
             episode: dict[str, list[str] | NDArray[Any]] = {name: array[frames] for name, array in values.items()}
             stats[table.column(EPISODE)[frames.start].as_py()] = compute_episode_stats(episode, info.features)
             advance(frames.stop - frames.start)
-        write_table_one_row_group_per_episode(_with_columns(table, values, schema), _new(target, source, path))
-    for path in _parquet_files(source.joinpath(*_EPISODES)):
-        pq.write_table(_with_stats(_read(path), stats), _new(target, source, path))
+        write_table_one_row_group_per_episode(_with_columns(table, values, schema), _new(target, source.root, path))
+    for path in parquet_files(source.root / EPISODES):
+        pq.write_table(_with_stats(read_table(path), stats), _new(target, source.root, path))
     # LeRobot adds one episode after the other; the same order gives the same digits.
     total: Stats = functools.reduce(
         lambda sofar, each: aggregate_stats([sofar, each]), (stats[episode] for episode in sorted(stats))
     )
-    write_stats((load_stats(source) or {}) | total, target)
+    write_stats((load_stats(source.root) or {}) | total, target)
     write_info(info, target)
-
-
-def _vectors(table: pa.Table, column: str) -> Floats:
-    flat = table.column(column).combine_chunks().flatten().to_numpy(zero_copy_only=False)
-    return flat.astype(np.float32).reshape(len(table), -1)
 
 
 def _with_columns(table: pa.Table, values: Mapping[str, Floats], schema: pa.Schema) -> pa.Table:
@@ -166,7 +111,7 @@ def _with_stats(episodes: pa.Table, stats: Mapping[int, Stats]) -> pa.Table:
 
 def _copy(source: Path, target: Path) -> None:
     """Copy all that does not depend on the columns; link the videos."""
-    shutil.copytree(source, target, ignore=_except(source, {_DATA, _VIDEOS, ".cache", ".git", str(Path(*_EPISODES))}))
+    shutil.copytree(source, target, ignore=_except(source, {DATA, _VIDEOS, ".cache", ".git", EPISODES}))
     if (source / _VIDEOS).exists():
         shutil.copytree(source / _VIDEOS, target / _VIDEOS, copy_function=_link)
 
@@ -190,7 +135,3 @@ def _new(target: Path, source: Path, path: Path) -> Path:
     copy = target / path.relative_to(source)
     copy.parent.mkdir(parents=True, exist_ok=True)
     return copy
-
-
-def _parquet_files(folder: Path) -> list[Path]:
-    return sorted(folder.glob("*/*.parquet"))

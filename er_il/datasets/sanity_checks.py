@@ -1,8 +1,8 @@
-"""Suspicion: joint values that do not look like this arm's, and what they look like instead.
+"""Sanity checks of an arm's joint values, and the likely cause where they fail.
 
-Each explanation (other units, another order, reversed joints, another arm) says what the arm's
-angles would be if it were true. It is believed where those angles stay within the joint limits and,
-if the end effector's position was recorded too, where forward kinematics then agrees with it.
+Each candidate cause (other units, another order, reversed joints, another arm) implies other joint
+angles. It is accepted if those stay within the joint limits and, where the end effector's position
+was recorded too, if forward kinematics agrees with it.
 """
 
 import itertools
@@ -23,17 +23,17 @@ from er_il.spaces.motors import UNITS, Motors
 Array = NDArray[np.float64]
 
 SAMPLES = 500  # frames that are looked at
-FEW = 12  # frames that every order of the joints is tried on
-BEYOND = 0.05  # [rad] by which measured joints may exceed a URDF's limits
-TOLERATED = 0.01  # share of values beyond their limits that proves nothing
-STILL = 0.12  # [rad] an arm whose joints all stay this close to zero was converted from degrees once too often
-OFF = 0.02  # [m] between recorded and computed end effector, after the best fit of their frames
-MUCH = 5.0  # an explanation fits the recorded end effector better by this factor
+ORDER_SAMPLES = 12  # frames that every order of the joints is tried on
+LIMIT_TOLERANCE = 0.05  # [rad] by which measured joints may exceed a URDF's limits
+OUTSIDE_TOLERANCE = 0.01  # share of values beyond their limits that proves nothing
+STATIONARY = 0.12  # [rad] an arm whose joints all stay this close to zero was converted from degrees once too often
+POSITION_TOLERANCE = 0.02  # [m] between recorded and computed end effector, after the best fit of their frames
+IMPROVEMENT = 5.0  # a cause fits the recorded end effector better by this factor
 MAX_ORDERS = 5040  # orders of the joints that are tried one by one
 
 
 @dataclass(frozen=True)
-class Evidence:
+class JointSample:
     """Joint values of one arm as recorded, and where its end effector was recorded to be."""
 
     arm: Arm
@@ -41,7 +41,7 @@ class Evidence:
     values: Array  # (N, n) in the order and the units of the motors
     positions: Array | None  # (N, 3) [m] in any fixed frame
 
-    def sampled(self) -> "Evidence":
+    def thinned(self) -> "JointSample":
         """The same with few frames, spread evenly over those that hold numbers."""
         finite = np.flatnonzero(np.all(np.isfinite(self.values), axis=1))
         rows = finite[np.unique(np.linspace(0, len(finite) - 1, SAMPLES).astype(int))] if len(finite) else finite
@@ -50,42 +50,42 @@ class Evidence:
 
 
 @dataclass(frozen=True)
-class Explanation:
-    """A mistake that would explain the values."""
+class Cause:
+    """A mistake in the declaration of the arm that would explain the values."""
 
     text: str
     arm: Arm
     q: Array  # (N, n) [rad] what the angles would be
 
 
-def suspect(evidence: Evidence) -> str:
-    """Say what is wrong with the values and what they look like; "" if nothing is."""
-    sample = evidence.sampled()
+def check_joint_values(given: JointSample) -> str:
+    """Describe what is wrong with joint values and the likely causes; "" if they are plausible."""
+    sample = given.thinned()
     if not len(sample.values):
         return "There is no frame in which all joint values are numbers."
     q = sample.motors.angles(sample.values)
-    beyond, off = _beyond(sample.arm, q), _off(sample.arm, q, sample.positions)
-    still = sample.motors.units == "deg" and np.abs(q).max() < STILL
+    beyond, off = _share_outside(sample.arm, q), _position_error(sample.arm, q, sample.positions)
+    still = sample.motors.units == "deg" and np.abs(q).max() < STATIONARY
     order = _order_by_name(sample)
-    if beyond <= TOLERATED and off <= OFF and not still and order is None:
+    if beyond <= OUTSIDE_TOLERANCE and off <= POSITION_TOLERANCE and not still and order is None:
         return ""
     found = [order] if order is not None else []
-    for explanation in _explanations(sample):
-        if _beyond(explanation.arm, explanation.q) > TOLERATED:
+    for cause in _causes(sample):
+        if _share_outside(cause.arm, cause.q) > OUTSIDE_TOLERANCE:
             continue
-        better = _off(explanation.arm, explanation.q, sample.positions)
-        if off > OFF and better > max(OFF, off / MUCH):
+        better = _position_error(cause.arm, cause.q, sample.positions)
+        if off > POSITION_TOLERANCE and better > max(POSITION_TOLERANCE, off / IMPROVEMENT):
             continue
-        if beyond > TOLERATED or still or off > OFF:
-            found.append(explanation)
-    if off > OFF:
-        found.sort(key=lambda each: _off(each.arm, each.q, sample.positions) > OFF)
+        if beyond > OUTSIDE_TOLERANCE or still or off > POSITION_TOLERANCE:
+            found.append(cause)
+    if off > POSITION_TOLERANCE:
+        found.sort(key=lambda each: _position_error(each.arm, each.q, sample.positions) > POSITION_TOLERANCE)
     return f"{_symptom(sample, q, beyond, off, still)} {_verdict([each.text for each in found])}"
 
 
-def _symptom(sample: Evidence, q: Array, beyond: float, off: float, still: bool) -> str:
+def _symptom(sample: JointSample, q: Array, beyond: float, off: float, still: bool) -> str:
     arm = sample.arm
-    if beyond > TOLERATED:
+    if beyond > OUTSIDE_TOLERANCE:
         excess = np.maximum(arm.lower - q, q - arm.upper).max(axis=0)
         worst = int(excess.argmax())
         return (
@@ -94,7 +94,7 @@ def _symptom(sample: Evidence, q: Array, beyond: float, off: float, still: bool)
         )
     if still:
         return f"The joints of {arm.name} never leave zero by more than {np.abs(q).max():.3f} rad."
-    if off > OFF:
+    if off > POSITION_TOLERANCE:
         return f"The recorded end effector is {off:.2f} m away from where {arm.name}'s kinematics has it."
     return "The joints' names are in another order than the arm's."
 
@@ -106,30 +106,30 @@ def _verdict(texts: Sequence[str]) -> str:
     return f"It looks like {texts[0]}.{others}"
 
 
-def _explanations(sample: Evidence) -> Iterator[Explanation]:
+def _causes(sample: JointSample) -> Iterator[Cause]:
     arm, motors, values = sample.arm, sample.motors, sample.values
     for units in UNITS:
         if units != motors.units:
             q = replace(motors, units=units).angles(values)
-            if np.abs(q).max() >= STILL:
+            if np.abs(q).max() >= STATIONARY:
                 long = {"deg": "degrees", "rad": "radians"}
                 text = f"wrong units: the values are {long[units]}, not {long[motors.units]} (--units {units})"
-                yield Explanation(text, arm, q)
+                yield Cause(text, arm, q)
     q = motors.angles(values)
     for name in PRESETS:
         other = Arm.preset(name)
         if name != arm.name and other.dof == arm.dof:
-            yield Explanation(f"the wrong arm: the values fit {name} (--arm {name})", other, q)
+            yield Cause(f"the wrong arm: the values fit {name} (--arm {name})", other, q)
     if (order := _best_order(sample, q)) is not None:
         names = " ".join(motors.joints[i] for i in order)
-        yield Explanation(f"the wrong joint order: they fit as --joints {names}", arm, q[:, order])
+        yield Cause(f"the wrong joint order: they fit as --joints {names}", arm, q[:, order])
     signs = _best_signs(sample, q)
     if np.any(signs < 0):
         reversed_joints = ", ".join(joint for joint, sign in zip(motors.joints, signs, strict=True) if sign < 0)
-        yield Explanation(f"joints that turn the other way: {reversed_joints} (--signs)", arm, q * signs)
+        yield Cause(f"joints that turn the other way: {reversed_joints} (--signs)", arm, q * signs)
 
 
-def _order_by_name(sample: Evidence) -> Explanation | None:
+def _order_by_name(sample: JointSample) -> Cause | None:
     """The order that numbers in the names tell, if they tell another one."""
     numbers = [_numbers(names) for names in (sample.motors.joints, sample.arm.joints)]
     if any(len(set(each)) != len(each) or None in each for each in numbers):
@@ -140,7 +140,7 @@ def _order_by_name(sample: Evidence) -> Explanation | None:
     order = [int(np.flatnonzero(ranks[0] == rank)[0]) for rank in ranks[1]]
     names = " ".join(sample.motors.joints[i] for i in order)
     q = sample.motors.angles(sample.values)[:, order]
-    return Explanation(f"the wrong joint order: by their names it is --joints {names}", sample.arm, q)
+    return Cause(f"the wrong joint order: by their names it is --joints {names}", sample.arm, q)
 
 
 def _numbers(names: Sequence[str]) -> list[int | None]:
@@ -148,46 +148,48 @@ def _numbers(names: Sequence[str]) -> list[int | None]:
     return [int(each[-1]) if each else None for each in found]
 
 
-def _best_order(sample: Evidence, q: Array) -> list[int] | None:
+def _best_order(sample: JointSample, q: Array) -> list[int] | None:
     """The other order of joints that fits best: the recorded end effector if there is one, else the limits."""
     arm, n = sample.arm, sample.arm.dof
     excess = np.maximum(arm.lower - q[:, :, None], q[:, :, None] - arm.upper)  # (N, value, joint)
-    outside = (excess > BEYOND).mean(axis=0)
+    outside = (excess > LIMIT_TOLERANCE).mean(axis=0)
     if sample.positions is None or math.factorial(n) > MAX_ORDERS:
         # As few joints as possible elsewhere; among those, near the middle of their ranges.
         middle = np.abs(q.mean(axis=0)[:, None] - (arm.lower + arm.upper) / 2) / (arm.upper - arm.lower)
         order = linear_sum_assignment((outside + 1e-2 * (1 - np.eye(n)) + 1e-4 * middle).T)[1].tolist()
     else:
         few, positions = _few(q), _few(sample.positions)
-        possible = outside <= TOLERATED
+        possible = outside <= OUTSIDE_TOLERANCE
         orders = [each for each in itertools.permutations(range(n)) if all(possible[each[j], j] for j in range(n))]
         if not orders:
             return None
-        order = list(min(orders, key=lambda each: _off(arm, few[:, each], positions)))
+        order = list(min(orders, key=lambda each: _position_error(arm, few[:, each], positions)))
     return None if order == list(range(n)) else order
 
 
-def _best_signs(sample: Evidence, q: Array) -> Array:
+def _best_signs(sample: JointSample, q: Array) -> Array:
     arm = sample.arm
-    beyond = [((arm.lower - BEYOND > s * q) | (s * q > arm.upper + BEYOND)).mean(axis=0) for s in (1, -1)]
-    signs = np.where(beyond[0] > beyond[1] + TOLERATED, -1.0, 1.0)
+    beyond = [
+        ((arm.lower - LIMIT_TOLERANCE > s * q) | (s * q > arm.upper + LIMIT_TOLERANCE)).mean(axis=0) for s in (1, -1)
+    ]
+    signs = np.where(beyond[0] > beyond[1] + OUTSIDE_TOLERANCE, -1.0, 1.0)
     if sample.positions is None or arm.dof > 8:
         return signs
     few, positions = _few(q), _few(sample.positions)
     choices = np.array(list(itertools.product((1.0, -1.0), repeat=arm.dof)))
-    return min(choices, key=lambda each: _off(arm, few * each, positions))
+    return min(choices, key=lambda each: _position_error(arm, few * each, positions))
 
 
 def _few(rows: Array) -> Array:
-    return rows[np.unique(np.linspace(0, len(rows) - 1, FEW).astype(int))]
+    return rows[np.unique(np.linspace(0, len(rows) - 1, ORDER_SAMPLES).astype(int))]
 
 
-def _beyond(arm: Arm, q: Array) -> float:
+def _share_outside(arm: Arm, q: Array) -> float:
     """Share of joint values that are outside their limits."""
-    return float(((q < arm.lower - BEYOND) | (q > arm.upper + BEYOND)).mean())
+    return float(((q < arm.lower - LIMIT_TOLERANCE) | (q > arm.upper + LIMIT_TOLERANCE)).mean())
 
 
-def _off(arm: Arm, q: Array, positions: Array | None) -> float:
+def _position_error(arm: Arm, q: Array, positions: Array | None) -> float:
     """Root mean square distance [m] of recorded and computed positions, their frames fitted; 0 if none is recorded."""
     if positions is None:
         return 0.0

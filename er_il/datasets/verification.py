@@ -1,4 +1,4 @@
-"""Verification: whether an encoded dataset gives its joint vectors back, and whether they are this arm's."""
+"""Verification of an encoded dataset: round-trip errors, singularities, and sanity checks of its joint values."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from er_il.datasets.decoding import DecodedEpisode, Episode, decode_episodes
-from er_il.datasets.encoding import dataset_info, dataset_layout, joints_column, read_episodes
-from er_il.datasets.rewriting import read_vectors
-from er_il.datasets.sanity_checks import Evidence, suspect
-from er_il.datasets.schema import STATE, Feature, dimension_names
+from er_il.datasets.dataset import Dataset
+from er_il.datasets.decoding import DecodedEpisode, EncodedEpisode, decode_episodes, read_encoded_episodes
+from er_il.datasets.sanity_checks import JointSample, check_joint_values
+from er_il.datasets.schema import STATE
 from er_il.kinematics.rotation import Quaternion
 from er_il.kinematics.solver import LIMIT_MARGIN, Status
 from er_il.spaces.joint_choice import stretches
@@ -29,7 +28,7 @@ POSITION_NAMES = ("ee.x", "ee.y", "ee.z")
 
 
 @dataclass(frozen=True)
-class Stretch:
+class SingularInterval:
     """Consecutive frames of an episode in which an arm is near a singularity."""
 
     episode: int
@@ -40,8 +39,8 @@ class Stretch:
 
 
 @dataclass(frozen=True, eq=False)
-class Checked:
-    """One episode of T frames for P arms."""
+class CheckedEpisode:
+    """Round-trip errors of one episode of T frames for P arms."""
 
     number: int
     status: NDArray[np.str_]  # (T, P)
@@ -54,12 +53,12 @@ class Checked:
 
 @dataclass(frozen=True, eq=False)
 class Verification:
-    """What a dataset's round trip showed."""
+    """Results of decoding a dataset and comparing with its joint vectors."""
 
     layout: Layout
-    episodes: tuple[Checked, ...]
-    compared: bool  # whether the joint vectors were there to compare with
-    suspicions: dict[str, str]  # arm -> what is wrong with its joint values
+    episodes: tuple[CheckedEpisode, ...]
+    compared: bool  # True if the dataset holds the joint vectors to compare with
+    findings: dict[str, str]  # arm -> what is wrong with its joint values
     other_side: dict[str, float]  # arm -> share of quaternions beyond the hemisphere of their reference
 
     @property
@@ -88,13 +87,14 @@ class Verification:
             if set(counter) != {Status.OK}
         }
 
-    def stretches(self) -> list[Stretch]:
-        """Where arms are near singularities."""
-        found = []
-        for each in self.episodes:
-            for arm, label in enumerate(self.arms):
-                found += [Stretch(each.number, label, *stretch) for stretch in stretches(each.conditioning[:, arm])]
-        return found
+    def singular_intervals(self) -> list[SingularInterval]:
+        """Intervals in which arms are near singularities."""
+        return [
+            SingularInterval(each.number, label, *interval)
+            for each in self.episodes
+            for arm, label in enumerate(self.arms)
+            for interval in stretches(each.conditioning[:, arm])
+        ]
 
     def report(self) -> dict[str, Any]:
         """Everything as JSON."""
@@ -109,49 +109,49 @@ class Verification:
                 "rotation_error": _percentiles(self.gathered("rotation_error")[arm]),
                 "flagged": int(sum(each.flagged[:, arm].sum() for each in self.episodes)),
                 "quaternions_other_side": self.other_side.get(label, 0.0),
-                "suspicion": self.suspicions.get(label, ""),
+                "finding": self.findings.get(label, ""),
             }
         return {
             "frames": sum(len(each.status) for each in self.episodes),
             "episodes": len(self.episodes),
             "arms": arms,
             "invalid_by_episode": self.invalid(),
-            "near_singularity": [vars(stretch) for stretch in self.stretches()],
+            "near_singularity": [vars(interval) for interval in self.singular_intervals()],
         }
 
 
-def verify(dataset: Path, workers: int, on_progress: Callable[[int, int], object]) -> Verification:
+def verify(root: Path, workers: int, on_progress: Callable[[int, int], object]) -> Verification:
     """Decode a dataset's actions and compare them with the joint vectors that were encoded.
 
     Seeds are the measured joints where the state has them, as on the robot, else the joint vector of
     the step before.
 
     Args:
-        dataset: Folder of a dataset that says what its actions mean.
+        root: Folder of a dataset that says what its actions mean.
         workers: Number of worker processes.
         on_progress: Called with the number of frames done, and their total.
 
     Raises:
         ErIlError: it does not say so, or is no dataset.
     """
-    info = dataset_info(dataset)
-    layout = dataset_layout(info.features)
-    truth = joints_column(info.features, layout)
-    episodes = read_episodes(dataset, info, layout, truth)
-    suspicions = _suspicions(dataset, info.features, layout, episodes)
+    dataset = Dataset(root)
+    layout = dataset.layout
+    truth = dataset.joints_column(layout)
+    episodes = read_encoded_episodes(dataset, layout, truth)
+    findings = _findings(dataset, layout, episodes)
     done = 0
 
     def advance(frames: int) -> None:
         nonlocal done
         done += frames
-        on_progress(done, info.total_frames)
+        on_progress(done, dataset.frames)
 
     decoded = decode_episodes(layout, episodes, workers, advance)
     checked = tuple(_check(layout, *each) for each in zip(episodes, decoded, strict=True))
-    return Verification(layout, checked, truth is not None, suspicions, _other_side(layout, episodes))
+    return Verification(layout, checked, truth is not None, findings, _other_side(layout, episodes))
 
 
-def _check(layout: Layout, episode: Episode, decoded: DecodedEpisode) -> Checked:
+def _check(layout: Layout, episode: EncodedEpisode, decoded: DecodedEpisode) -> CheckedEpisode:
     error = np.full(decoded.status.shape, np.nan)
     at_limit = np.empty(decoded.status.shape, dtype=bool)
     for p, part in enumerate(layout.parts):
@@ -160,7 +160,7 @@ def _check(layout: Layout, episode: Episode, decoded: DecodedEpisode) -> Checked
         if episode.truth is not None:
             error[:, p] = np.abs(q - layout.angles(part, episode.truth)).max(axis=1)
     flagged = (decoded.status != Status.OK) | (decoded.conditioning < SINGULAR) | at_limit
-    return Checked(
+    return CheckedEpisode(
         episode.number,
         decoded.status,
         error,
@@ -171,7 +171,7 @@ def _check(layout: Layout, episode: Episode, decoded: DecodedEpisode) -> Checked
     )
 
 
-def _other_side(layout: Layout, episodes: list[Episode]) -> dict[str, float]:
+def _other_side(layout: Layout, episodes: list[EncodedEpisode]) -> dict[str, float]:
     """Share of quaternions beyond their hemisphere, where another episode may have them with the other sign."""
     found = {}
     for part in layout.parts:
@@ -182,8 +182,8 @@ def _other_side(layout: Layout, episodes: list[Episode]) -> dict[str, float]:
     return found
 
 
-def _suspicions(dataset: Path, features: dict[str, Feature], layout: Layout, episodes: list[Episode]) -> dict[str, str]:
-    """Look at the joint values of each arm, measured ones where an end effector was measured with them."""
+def _findings(dataset: Dataset, layout: Layout, episodes: list[EncodedEpisode]) -> dict[str, str]:
+    """Check the joint values of each arm, measured ones where an end effector was measured with them."""
     recorded = None if episodes[0].truth is None else np.concatenate([np.asarray(each.truth) for each in episodes])
     measured = None if episodes[0].state is None else np.concatenate([np.asarray(each.state) for each in episodes])
     vectors = recorded if recorded is not None else measured
@@ -191,19 +191,19 @@ def _suspicions(dataset: Path, features: dict[str, Feature], layout: Layout, epi
         return {}
     found = {}
     for part in layout.parts:
-        positions = None if measured is None else _measured_positions(dataset, features, part.label)
+        positions = None if measured is None else _measured_positions(dataset, part.label)
         values = (vectors if positions is None or measured is None else measured)[:, layout.indices(part)]
-        if text := suspect(Evidence(part.space.arm, part.motors, values, positions)):
+        if text := check_joint_values(JointSample(part.space.arm, part.motors, values, positions)):
             found[part.label or part.space.arm.name] = text
     return found
 
 
-def _measured_positions(dataset: Path, features: dict[str, Feature], label: str) -> Array | None:
-    names = dimension_names(features[STATE])
+def _measured_positions(dataset: Dataset, label: str) -> Array | None:
+    names = dataset.names(STATE)
     for prefix in (f"{label}_", f"{label}.") if label else ("",):
         if all(prefix + name in names for name in POSITION_NAMES):
             columns = [names.index(prefix + name) for name in POSITION_NAMES]
-            return read_vectors(dataset, STATE)[:, columns].astype(np.float64)
+            return dataset.vectors(STATE)[:, columns].astype(np.float64)
     return None
 
 

@@ -1,11 +1,10 @@
-"""Wiring: what a user says about an arm of their robot, and the layout that follows from it."""
+"""Declaration of the arms of a robot by its user, and the layout of a dataset's actions that follows from it."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-import yaml
+from pydantic import StrictFloat, StrictInt, StrictStr
 
 from er_il.arms.arm import Arm, ArmAngleFrames
 from er_il.arms.presets import PRESETS
@@ -14,27 +13,30 @@ from er_il.spaces.layout import Layout, Part
 from er_il.spaces.motors import Motors
 from er_il.spaces.registry import make_arm_space
 from er_il.spaces.spec import ACTION
+from er_il.support.declaration import Declaration, declared, read_declaration
 from er_il.support.errors import ArmError, DatasetError, UnknownNameError
+
+Names = tuple[StrictStr, ...]
+Numbers = tuple[StrictInt | StrictFloat, ...]
 
 SUFFIX = ".pos"  # LeRobot's name for the position of a motor
 
 
-@dataclass(frozen=True)
-class Wiring:
-    """One arm: its kinematics, and the dimensions that hold its joints. What is empty is guessed or left out."""
+class Wiring(Declaration):
+    """One arm: its kinematics, and the dimensions that hold its joints. Empty values are guessed or left out."""
 
-    arm: str  # preset, or path of a URDF
-    label: str = ""
-    ee_frame: str = ""
-    base_frame: str = ""
-    urdf_joints: tuple[str, ...] = ()
-    redundant: tuple[str, ...] = ()
-    angle_frames: tuple[str, ...] = ()  # shoulder, elbow, wrist
-    joints: tuple[str, ...] = ()  # dimensions of the action, in the order of the arm's joints
-    state_joints: tuple[str, ...] = ()  # likewise of the state
-    units: str = "rad"
-    signs: tuple[float, ...] = ()
-    offsets: tuple[float, ...] = ()
+    arm: StrictStr  # preset, or path of a URDF
+    label: StrictStr = ""
+    ee_frame: StrictStr = ""
+    base_frame: StrictStr = ""
+    urdf_joints: Names = ()
+    redundant: Names = ()
+    angle_frames: Names = ()  # shoulder, elbow, wrist
+    joints: Names = ()  # dimensions of the action, in the order of the arm's joints
+    state_joints: Names = ()  # likewise of the state
+    units: StrictStr = "rad"
+    signs: Numbers = ()
+    offsets: Numbers = ()
 
     def build_arm(self) -> Arm:
         """Build the arm.
@@ -104,33 +106,22 @@ def read_wirings(path: Path) -> list[Wiring]:
     A URDF's path counts from the file's folder.
 
     Raises:
-        DatasetError: the file is unreadable, or no such mapping.
-        UnknownNameError: an entry has a key that is not known.
+        DatasetError: the file is unreadable, no such mapping, or an entry has a wrong key or value.
     """
-    try:
-        entries = yaml.safe_load(path.read_text())
-    except (OSError, yaml.YAMLError) as error:
-        raise DatasetError(f"Cannot read {path}: {str(error).splitlines()[0]}.") from error
+    return read_declaration(path, "file of arms", DatasetError, lambda entries: _wirings(entries, path.parent))
+
+
+def _wirings(entries: object, folder: Path) -> list[Wiring]:
     if not isinstance(entries, dict) or not entries or not all(isinstance(entry, dict) for entry in entries.values()):
-        raise DatasetError(f"{path} needs one entry an arm, such as left: {{arm: panda, joints: [...]}}.")
-    return [_wiring(str(label), entry, path.parent) for label, entry in entries.items()]
-
-
-def _wiring(label: str, entry: Mapping[str, Any], folder: Path) -> Wiring:
-    valid = {field.name: field.default for field in fields(Wiring) if field.name != "label"}
-    for key in entry:
-        if key not in valid:
-            raise UnknownNameError(f"key of arm {label!r}", key, valid)
-    if "arm" not in entry:
-        raise DatasetError(f"The arm {label!r} needs a key arm: a preset or the path of a URDF.")
-    values = {}
-    for key, value in entry.items():
-        if isinstance(valid[key], tuple) != isinstance(value, list):
-            raise DatasetError(f"{key} of arm {label!r} is {'a list' if isinstance(valid[key], tuple) else 'a word'}.")
-        values[key] = tuple(value) if isinstance(value, list) else str(value)
-    wiring = Wiring(label=label, **values)
-    beside = folder / wiring.arm
-    return wiring if wiring.arm in PRESETS or not beside.is_file() else replace(wiring, arm=str(beside))
+        raise DatasetError("It needs one entry an arm, such as left: {arm: panda, joints: [...]}.")
+    found = []
+    for label, entry in entries.items():
+        values: dict[str, Any] = {**entry, "label": str(label)}
+        arm = values.get("arm")
+        if isinstance(arm, str) and arm not in PRESETS and (folder / arm).is_file():
+            values["arm"] = str(folder / arm)
+        found.append(declared(Wiring, values, f"wiring of arm {label!r}", DatasetError))
+    return found
 
 
 def _joints_named_as(arm: Arm, names: Sequence[str]) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""Replay: what recorded actions do when a follower executes them again, the ceiling of each encoding.
+"""Replay of recorded actions by a follower: the upper bound of the success that an encoding allows.
 
 A policy that imitated its demonstrations perfectly would do what a replay does. Where a replay
 fails, the encoding has lost something that the task needs.
@@ -6,15 +6,16 @@ fails, the encoding has lost something that the task needs.
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from er_il.arms.arm import Arm
+from er_il.datasets.dataset import INFO, Dataset, datasets_in
 from er_il.datasets.recipe import Recipe
-from er_il.datasets.record import Record, Recorded, read_episodes, read_spec
+from er_il.datasets.record import DatasetRecord, RecordedEpisode, read_episodes
 from er_il.envs.decoders import DECODERS, decoder
 from er_il.envs.tasks import task_id
 from er_il.envs.wrapper import ActionSpaceEnv, make_action_space_env
@@ -88,12 +89,12 @@ def replay(datasets: Sequence[Path], workers: int, advance: Callable[[Path, str,
             for job in jobs:
                 done.append(job.result())
                 advance(path, play.decoder, len(done), len(jobs))
-            dropped = Counter(Record.read(path).dropped.values())
+            dropped = Counter(DatasetRecord.read(path).dropped.values())
             cells.append(ReplayCell(play.recipe.task, play.decoder, tuple(done), dropped))
     return cells
 
 
-def replay_demo(world: ActionSpaceEnv, demo: Recorded) -> Replayed:
+def replay_demo(world: ActionSpaceEnv, demo: RecordedEpisode) -> Replayed:
     """Execute a demo's actions in the world it was recorded in."""
     world.reset(seed=demo.seed)
     unwrapped: Any = world.unwrapped
@@ -125,8 +126,8 @@ def find_datasets(names: Sequence[str]) -> list[Path]:
     found = []
     for name in names:
         folder = next((path for path in (Path(name), Path("datasets") / name) if path.is_dir()), None)
-        inside = [] if folder is None else sorted(path.parent.parent for path in folder.glob("*/meta/info.json"))
-        if folder is not None and (folder / "meta/info.json").is_file():
+        inside = [] if folder is None else datasets_in(folder)
+        if folder is not None and (folder / INFO).is_file():
             found.append(folder)
         elif inside:
             found += inside
@@ -149,14 +150,14 @@ class _Play:
     rotation: str
 
     def make(self) -> ActionSpaceEnv:
-        environment = replace(self.recipe, cameras=()).environment
+        environment = self.recipe.replaced(cameras=()).environment
         return make_action_space_env(
             task_id(self.recipe.task), decoder(self.decoder), rotation=self.rotation, **environment
         )
 
 
 def _plays(dataset: Path) -> list[_Play]:
-    spec, recipe = read_spec(dataset), Record.read(dataset).recipe
+    spec, recipe = Dataset(dataset).spec, DatasetRecord.read(dataset).recipe
     name = name_of(
         arm_space_from_spec(spec), Arm.preset(recipe.arm)
     )  # refuses what this version would decode differently
@@ -172,7 +173,7 @@ class _Worker:
     play: _Play | None = None
     world: ActionSpaceEnv | None = None
 
-    def replay(self, play: _Play, demo: Recorded) -> Replayed:
+    def replay(self, play: _Play, demo: RecordedEpisode) -> Replayed:
         if self.world is None or play != self.play:
             self.play, self.world = play, play.make()
         return replay_demo(self.world, demo)
@@ -186,6 +187,6 @@ def _prepare() -> None:
     _worker = _Worker()
 
 
-def _replay(play: _Play, demo: Recorded) -> Replayed:
+def _replay(play: _Play, demo: RecordedEpisode) -> Replayed:
     assert _worker is not None
     return _worker.replay(play, demo)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from er_il.evaluation.rollouts import Cell, Episode
-from er_il.support.atomic_files import write_json, write_whole
+from er_il.support.atomic_files import write_atomically, write_json
 
 REFERENCE = "joint"  # the decoder that the others are compared with, rollout by rollout
 RESULTS = "results.json"  # the report of a grid, from which everything is rendered
@@ -18,13 +18,13 @@ EPISODES = "episodes.csv.gz"
 def write_cells(cells: Sequence[Cell], meta: dict[str, Any], folder: Path) -> None:
     """Write ``report.json`` and one row an episode in ``episodes.csv``."""
     write_json(folder / "report.json", {"meta": meta, "cells": [cell.report() for cell in cells]})
-    write_whole(folder / "episodes.csv", lambda path: _write_csv(cells, path))
+    write_atomically(folder / "episodes.csv", lambda path: _write_csv(cells, path))
 
 
 def save_cell(cell: Cell, path: Path, notes: Mapping[str, Any] | None = None) -> None:
     """Write a cell with all its episodes, for :func:`load_cell`, and notes (JSON) on how it came about."""
     data = vars(cell) | {"episodes": [vars(episode) for episode in cell.episodes], "notes": notes or {}}
-    write_whole(path, lambda partial: partial.write_text(json.dumps(data)))
+    write_atomically(path, lambda partial: partial.write_text(json.dumps(data)))
 
 
 def load_notes(path: Path) -> dict[str, Any]:

@@ -5,7 +5,7 @@ goes on where it was. Training and rollouts run side by side, one thread each.
 """
 
 import json
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from rich.progress import Progress
@@ -98,7 +98,7 @@ class Demo:
             return self._run(progress, workers)
 
     def _run(self, progress: Progress, workers: int) -> list[Cell]:
-        recipe = replace(Recipe.load(self.task), seed=self.seed)
+        recipe = Recipe.load(self.task).replaced(seed=self.seed)
         if self.demonstrations is not None:
             recipe = recipe.resized(self.demonstrations)
         generate(recipe, self.spaces, self.out / "datasets" / self.task, progress, workers)

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -99,7 +99,7 @@ class Grid:
 
     def recipe(self, task: str) -> Recipe:
         """What is recorded of a task."""
-        recipe = replace(Recipe.load(task, self.arm), cameras=self.cameras.get(task, ()))
+        recipe = Recipe.load(task, self.arm).replaced(cameras=self.cameras.get(task, ()))
         return recipe if self.episodes is None else recipe.resized(self.episodes)
 
     def seeds_of(self, entry: Entry) -> tuple[int, ...]:

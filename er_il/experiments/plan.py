@@ -12,7 +12,7 @@ from pathlib import Path
 import yaml
 from rich.progress import Progress
 
-from er_il.datasets.record import Record
+from er_il.datasets.record import DatasetRecord
 from er_il.datasets.recording import generate
 from er_il.evaluation.posture_baselines import space_of
 from er_il.evaluation.results import load_cell
@@ -20,7 +20,7 @@ from er_il.evaluation.rollouts import Cell
 from er_il.experiments.grid import Entry, Grid
 from er_il.experiments.jobs import RollOut, Train, roll_outs, steps_of
 from er_il.policy.configuration import default_config
-from er_il.support.atomic_files import write_whole
+from er_il.support.atomic_files import write_atomically
 from er_il.support.errors import ErIlError
 
 OWNER = "benchmark.json"
@@ -74,7 +74,9 @@ class Plan:
         """
         for task, demonstrate in self._demonstrations.items():
             for dataset in (demonstrate.out / space for space in demonstrate.spaces):
-                if dataset.exists() and (what := self.grid.recipe(task).differences(Record.read(dataset).recipe)):
+                if dataset.exists() and (
+                    what := self.grid.recipe(task).differences(DatasetRecord.read(dataset).recipe)
+                ):
                     raise ErIlError(
                         f"{dataset} holds another recipe's demonstrations; asked for is {what}. "
                         f"Choose another --out, or delete what {self.out} holds of {task}."
@@ -99,7 +101,7 @@ class Plan:
             raise ErIlError(f"{self.out} holds something else than a benchmark; choose another --out.")
         self.out.mkdir(parents=True, exist_ok=True)
         claim = json.dumps({"title": self.grid.title, "configurations": theirs | mine}, indent=2)
-        write_whole(owner, lambda path: path.write_text(claim))
+        write_atomically(owner, lambda path: path.write_text(claim))
 
     @cached_property
     def _demonstrations(self) -> dict[str, Demonstrate]:

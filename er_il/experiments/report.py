@@ -12,7 +12,7 @@ from er_il.evaluation.rollouts import FIRST_SEED, Cell
 from er_il.evaluation.statistics import exact_interval, paired_difference
 from er_il.experiments.grid import Entry
 from er_il.experiments.plan import Plan
-from er_il.support.atomic_files import write_json, write_whole
+from er_il.support.atomic_files import write_atomically, write_json
 from er_il.support.provenance import provenance
 
 BySeed = Mapping[int, Cell]  # the rollouts of an entry by training seed
@@ -33,7 +33,7 @@ def write_results(plan: Plan, folder: Path) -> dict[str, Any]:
             rows += _rows(entry, by_seed)
     report = {"meta": provenance() | _meta(plan, cells), "cells": cells}
     write_json(folder / RESULTS, report)
-    write_whole(folder / EPISODES, lambda path: path.write_bytes(_compressed(rows)))
+    write_atomically(folder / EPISODES, lambda path: path.write_bytes(_compressed(rows)))
     return report
 
 

@@ -15,7 +15,7 @@ from er_il.experiments.schedule import FileResult, Job
 from er_il.experiments.showing import telling_seed
 from er_il.report.pictures import Row, moments, write_strip
 from er_il.report.success import label_of
-from er_il.support.atomic_files import write_whole
+from er_il.support.atomic_files import write_atomically
 
 DECODERS = ("joint", "erj", "task-nearest", "task-posture")  # as far as the grid has them
 PICTURES = 5  # of a rollout
@@ -55,7 +55,7 @@ class Strip(FileResult):
             trace, pictures = record_rollout(trained.training.policy, trained.task, decoder, self.seed, FILM_EVERY)
             outcome = trace.outcome.replace("_", " ")
             rows.append(Row(label_of(decoder), outcome, trace.outcome == SUCCESS, moments(pictures, PICTURES)))
-        write_whole(self.path, lambda path: _write(rows, path))
+        write_atomically(self.path, lambda path: _write(rows, path))
 
 
 def _write(rows: Sequence[Row], path: Path) -> None:

@@ -17,7 +17,7 @@ from er_il.envs.contract import Contract, dataset_info
 from er_il.policy.configuration import input_features, named_inputs
 from er_il.spaces.registry import check_space, split_name
 from er_il.spaces.spec import action_spec
-from er_il.support.atomic_files import write_whole
+from er_il.support.atomic_files import write_atomically
 from er_il.support.errors import DatasetError, PolicyError
 from er_il.support.workers import end_with_parent
 
@@ -122,7 +122,7 @@ class Training:
         if self._renames(inputs):
             values = yaml.safe_load(self.config.read_text())
             values["policy"]["input_features"] = inputs
-            write_whole(self.own_config, lambda path: path.write_text(yaml.safe_dump(values, sort_keys=False)))
+            write_atomically(self.own_config, lambda path: path.write_text(yaml.safe_dump(values, sort_keys=False)))
 
     def _clear(self) -> None:
         if strangers := [path.name for path in self.out.iterdir() if path.name != _CHECKPOINTS]:

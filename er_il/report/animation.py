@@ -9,7 +9,7 @@ import av
 from PIL import Image, ImageDraw, ImageFont
 
 from er_il.report.pictures import BAD, GOOD, INK
-from er_il.support.atomic_files import write_whole
+from er_il.support.atomic_files import write_atomically
 
 WIDTH = 440  # [px] of a film
 HEADER, GAP = 30, 6  # [px] above a film for its title, and between films
@@ -37,7 +37,7 @@ def write_animation(panels: Sequence[Panel], path: Path) -> None:
     frames = [_frame(panels, pictures, at) for at in range(length)]
     durations = [period] * (length - 1) + [PAUSE]
     options = {"save_all": True, "append_images": frames[1:], "duration": durations, "loop": 0, "quality": QUALITY}
-    write_whole(path, lambda partial: frames[0].save(partial, format="WEBP", **options))
+    write_atomically(path, lambda partial: frames[0].save(partial, format="WEBP", **options))
 
 
 def _read(film: Path) -> tuple[Iterator[Image.Image], float]:

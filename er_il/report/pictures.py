@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from er_il.evaluation.recording import Picture
-from er_il.support.atomic_files import write_whole
+from er_il.support.atomic_files import write_atomically
 
 INK = "#222222"
 GOOD, BAD = "#2e7d32", "#b3261e"
@@ -27,7 +27,7 @@ class Row:
 
 def write_film(pictures: Sequence[Picture], path: Path, rate: int) -> None:
     """Write an mp4 (H.264) at ``rate`` pictures a second; the file is whole or absent."""
-    write_whole(path, lambda partial: _encode(pictures, partial, rate))
+    write_atomically(path, lambda partial: _encode(pictures, partial, rate))
 
 
 def _encode(pictures: Sequence[Picture], path: Path, rate: int) -> None:

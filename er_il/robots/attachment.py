@@ -15,13 +15,13 @@ from lerobot.policies.factory import POLICY_POSTPROCESSOR_DEFAULT_NAME, POLICY_P
 from lerobot.processor import RelativeActionsProcessorStep
 
 from er_il.control.commander import BEST_EFFORT
-from er_il.datasets.encoding import dataset_info
-from er_il.datasets.rewriting import appearing
-from er_il.datasets.schema import STATE, dimension_names
+from er_il.datasets.dataset import Dataset
+from er_il.datasets.schema import STATE
 from er_il.envs.contract import DECODE_POLICY_ACTION, decodes
 from er_il.policy.training import pretrained
 from er_il.robots.processors import DecodePolicyAction
-from er_il.spaces.spec import ACTION, action_spec
+from er_il.spaces.spec import ACTION
+from er_il.support.atomic_files import atomic_folder
 from er_il.support.errors import PolicyError, ShapeError
 
 _PREPROCESSOR, _POSTPROCESSOR = (
@@ -57,16 +57,15 @@ def attach(
     source = pretrained(policy)
     if decodes(source):
         raise PolicyError(f"The policy {source} decodes its actions already.")
-    info = dataset_info(dataset or _trained_on(source))
-    state = info.features.get(STATE)
+    trained_on = Dataset(dataset or _trained_on(source))
     step = DecodePolicyAction(
-        spec=action_spec(info.features),
-        period=1.0 / (fps or info.fps),
+        spec=trained_on.spec,
+        period=1.0 / (fps or trained_on.fps),
         on_invalid=on_invalid,
-        state_names=[] if state is None else list(dimension_names(state)),
+        state_names=list(trained_on.names(STATE)),
     )
-    _check_shape(source, info.features[ACTION]["shape"])
-    with appearing(out) as partial:
+    _check_shape(source, trained_on.features[ACTION]["shape"])
+    with atomic_folder(out) as partial:
         shutil.copytree(source, partial)
         _edit(partial / _PREPROCESSOR, _with_state_kept)
         _edit(partial / _POSTPROCESSOR, lambda steps: [*steps, _entry(DECODE_POLICY_ACTION, step.get_config())])

@@ -1,20 +1,27 @@
-"""Files that are whole or absent: written under another name, and given their own at the end."""
+"""Files and folders that are complete or absent: written under another name, then renamed."""
 
 import json
-from collections.abc import Callable, Mapping
+import shutil
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 import numpy as np
 
+from er_il.support.folder_lock import LOCK, locked
 
-def write_whole(path: Path, write: Callable[[Path], object]) -> None:
-    """Let ``write`` write a file under another name of the same ending, and give it its own once it is whole.
+PARTIAL = ".partial"  # in the name of every file and folder that is not complete
 
-    Where it fails, as on a full disk, nothing is left of it.
+
+def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
+    """Let ``write`` write a file under another name of the same suffix, one that no other process has, and rename it.
+
+    If it fails, as on a full disk, the unfinished file is removed.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_stem(f"{path.stem}.partial")
+    partial = path.with_stem(f"{path.stem}{PARTIAL}-{uuid4().hex[:8]}")
     try:
         write(partial)
     except BaseException:
@@ -24,8 +31,8 @@ def write_whole(path: Path, write: Callable[[Path], object]) -> None:
 
 
 def write_json(path: Path, data: Mapping[str, Any]) -> None:
-    """Write a report, for people to read too."""
-    write_whole(path, lambda partial: partial.write_text(json.dumps(data, indent=2) + "\n"))
+    """Write indented JSON."""
+    write_atomically(path, lambda partial: partial.write_text(json.dumps(data, indent=2) + "\n"))
 
 
 def write_arrays(path: Path, arrays: Mapping[str, Any]) -> None:
@@ -35,4 +42,51 @@ def write_arrays(path: Path, arrays: Mapping[str, Any]) -> None:
         with partial.open("wb") as file:  # given a path, NumPy would add an ending where there is none
             np.savez_compressed(file, allow_pickle=False, **arrays)
 
-    write_whole(path, write)
+    write_atomically(path, write)
+
+
+@contextmanager
+def atomic_folder(target: Path) -> Iterator[Path]:
+    """Yield the path of a folder to create, which is renamed to the target after the block, or removed if it fails.
+
+    It lies in ``<target>.partial``, which is locked: one process at a time writes a target. What a killed process left
+    there is removed.
+
+    Raises:
+        FileExistsError: the target exists.
+        ErIlError: another process is writing it.
+    """
+    if target.exists():
+        raise FileExistsError(17, "The target exists already", str(target))
+    with work_folder(target) as work:
+        _clear(work)
+        try:
+            yield work / target.name
+            (work / target.name).rename(target)
+        finally:
+            _clear(work)
+
+
+@contextmanager
+def work_folder(target: Path) -> Iterator[Path]:
+    """Yield ``<target>.partial``, a folder for one process at a time; removed at the end unless it holds something.
+
+    Raises:
+        ErIlError: another process works in it.
+    """
+    work = target.with_name(target.name + PARTIAL)
+    work.mkdir(parents=True, exist_ok=True)
+    with locked(work):
+        try:
+            yield work
+        finally:
+            if [path.name for path in work.iterdir()] == [LOCK]:
+                shutil.rmtree(work)
+
+
+def _clear(work: Path) -> None:
+    for path in work.iterdir():
+        if path.is_dir():
+            shutil.rmtree(path)
+        elif path.name != LOCK:
+            path.unlink()

@@ -35,21 +35,20 @@ def declared[T: Declaration](kind: type[T], values: object, what: str, error: ty
 
 
 def _message(cause: ValidationError, kind: type[Declaration], what: str) -> str:
-    problems = cause.errors(include_url=False)
-    keys = {each["type"]: [] for each in problems}
-    for each in problems:
-        keys[each["type"]].append(".".join(map(str, each["loc"])))
+    """All that is wrong, in one line."""
+    found: dict[str, list[str]] = {"extra_forbidden": [], "missing": []}
     said = []
-    if unknown := keys.pop("extra_forbidden", []):
-        said.append(f"A {what} has no {', '.join(unknown)}. Valid: {', '.join(kind.model_fields)}.")
-    if missing := keys.pop("missing", []):
-        said.append(f"The {what} lacks {', '.join(missing)}.")
-    for each in problems:
-        if each["type"] not in ("extra_forbidden", "missing"):
-            where = ".".join(map(str, each["loc"]))
-            said.append(
-                f"{where} is {each['input']!r}: {each['msg'].removeprefix('Value error, ')}.".replace("..", ".")
-            )
+    for each in cause.errors(include_url=False):
+        where = ".".join(map(str, each["loc"]))
+        if each["type"] in found:
+            found[each["type"]].append(where)
+            continue
+        text = each["msg"].removeprefix("Value error, ")
+        said.append(f"{where} is {each['input']!r}: {text}." if where else f"{text}.")
+    if found["missing"]:
+        said.insert(0, f"The {what} lacks {', '.join(found['missing'])}.")
+    if found["extra_forbidden"]:
+        said.insert(0, f"A {what} has no {', '.join(found['extra_forbidden'])}. Valid: {', '.join(kind.model_fields)}.")
     return " ".join(said)
 
 

@@ -20,6 +20,17 @@ def sole_use(folder: Path) -> Iterator[None]:
     Raises:
         ErIlError: another process works in it.
     """
+    with locked(folder):
+        yield
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Hold the lock of a folder.
+
+    Raises:
+        ErIlError: another process holds it.
+    """
     lock = FileLock(folder / LOCK)
     try:
         lock.acquire(blocking=False)

@@ -9,7 +9,7 @@ from urllib.parse import quote
 import rerun as rr
 
 from er_il.evaluation.trace import Trace
-from er_il.support.atomic_files import write_whole
+from er_il.support.atomic_files import write_atomically
 from er_il.support.display import has_display
 from er_il.support.errors import ErIlError
 from er_il.support.shapes import Shape
@@ -37,7 +37,7 @@ def save_recording(trace: Trace, shapes: Sequence[Shape], path: Path) -> None:
     memory = recording.memory_recording()  # Rerun's own way to a file waits for ever if the disk is full
     log_episode(recording, trace, shapes)
     try:
-        write_whole(path, lambda partial: partial.write_bytes(memory.drain_as_bytes()))
+        write_atomically(path, lambda partial: partial.write_bytes(memory.drain_as_bytes()))
     except OSError as error:
         raise ErIlError(f"Cannot write {path}: {error.strerror}.") from error
 

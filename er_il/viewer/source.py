@@ -1,4 +1,4 @@
-"""What can be viewed: the trace of a rollout, or an episode of a dataset, each with the world around it."""
+"""Sources of the viewer: the trace of a rollout, or an episode of a dataset, each with the scene around the arm."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -7,7 +7,7 @@ from typing import Any
 
 import gymnasium
 
-from er_il.datasets.record import RECORD, Record
+from er_il.datasets.record import RECORD, DatasetRecord
 from er_il.envs.tasks import task_id, task_names
 from er_il.evaluation.trace import SUFFIX, Trace
 from er_il.support.errors import DatasetError
@@ -32,9 +32,9 @@ def read_source(source: Path, episode: int | None = None, arm: str = "") -> tupl
         trace = trace_of_episode(source, episode or 0, arm)
         if not (source / RECORD).is_file():
             return trace, []
-        recipe = Record.read(source).recipe
+        recipe = DatasetRecord.read(source).recipe
         trace = replace(trace, task=recipe.task)
-        return trace, shapes_of(trace, replace(recipe, cameras=()).environment)
+        return trace, shapes_of(trace, recipe.replaced(cameras=()).environment)
     if not source.exists():
         raise DatasetError(f"There is no dataset or trace {source}.")
     if source.suffix != SUFFIX:
