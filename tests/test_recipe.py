@@ -8,6 +8,7 @@ import pytest
 from er_il.datasets.recipe import DEMO_SEED_BASE, Recipe, recipe_names
 from er_il.envs.tasks import task_id, task_names
 from er_il.support.errors import DatasetError, UnknownNameError
+from sim_tasks.tasks.registration import leader_class
 
 VALID = {"task": "reach_cup", "episodes": 40, "validation": 8}
 RECIPE = Recipe.from_dict(VALID)
@@ -103,7 +104,7 @@ def test_a_recipe_declares_the_randomisation_that_evaluation_has(name):
     task = type(gymnasium.make(task_id(name)).unwrapped)
     defaults = {
         key: parameter.default
-        for base in task.__mro__
+        for base in (*task.__mro__, *leader_class(task.task).__mro__)
         if "__init__" in vars(base)
         for key, parameter in inspect.signature(base.__init__).parameters.items()
     }

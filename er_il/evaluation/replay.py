@@ -158,9 +158,8 @@ class _Play:
 
 def _plays(dataset: Path) -> list[_Play]:
     spec, recipe = Dataset(dataset).spec, DatasetRecord.read(dataset).recipe
-    name = name_of(
-        arm_space_from_spec(spec), Arm.preset(recipe.arm)
-    )  # refuses what this version would decode differently
+    space = arm_space_from_spec(spec)  # refuses what this version would decode differently
+    name = name_of(space, Arm.preset(recipe.arm))
     rotation = spec.get("rotation", Quaternion.kind)
     readers = [key for key, each in DECODERS.items() if each.space == name] or [name]
     return [_Play(recipe, reader, rotation) for reader in readers]

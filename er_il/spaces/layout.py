@@ -191,10 +191,11 @@ class Layout:
         specs = []
         for part in self.parts:
             space = part.space.spec()
-            specs.append(space | {"arm": space["arm"] | arm_spec(part.space.arm)})
+            names = [*part.space.names, GRIPPER]  # version 1 names a gripper with each arm, also where there is none
+            specs.append(space | {"arm": space["arm"] | arm_spec(part.space.arm), "names": names})
         first = self.parts[0]
         if not first.label and first.motors.plain and self.names == self.of_space(first.space).names:
-            return specs[0] | {"names": list(self.encoded_names)}
+            return specs[0]
         arms = [
             {"label": part.label, "motors": part.motors.spec(), **spec}
             for part, spec in zip(self.parts, specs, strict=True)

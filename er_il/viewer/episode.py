@@ -9,7 +9,7 @@ from er_il.datasets.dataset import Dataset
 from er_il.datasets.decoding import decode_episode, read_encoded_episodes
 from er_il.datasets.schema import DEMO_SEED, ENVIRONMENT_STATE, STATE
 from er_il.evaluation.trace import Array, Trace
-from er_il.spaces.joint import JOINT
+from er_il.spaces.action_space import ActionSpace
 from er_il.spaces.layout import Layout, Part
 from er_il.support.errors import DatasetError, UnknownNameError
 from er_il.viewer.video import read_images
@@ -44,11 +44,8 @@ def trace_of_episode(root: Path, number: int, arm: str = "") -> Trace:
     episode = next(each for each in episodes if each.number == number)
     decoded = decode_episode(layout, episode)
     command = layout.angles(part, decoded.vectors)
-    if layout.kind == JOINT:
-        action = layout.angles(part, episode.actions)
-    else:
-        action = episode.actions[:, [layout.encoded_names.index(name) for name in part.names]]
-    spec = part.space.spec()
+    action = layout.split_encoded(episode.actions)[0][layout.parts.index(part)]
+    spec = ActionSpace(part.space).spec()  # the trace has the gripper's opening beside the arm's action
     return Trace(
         task="",
         seed=int(dataset.column(DEMO_SEED)[rows.start, 0]) if DEMO_SEED in dataset.features else 0,
