@@ -1,6 +1,6 @@
 """Render the pictures of docs/tasks.md: ``uv run python docs/render_tasks.py``.
 
-A task's demonstration of seed 0: its start, three moments on the way, its end.
+A task's demonstration of seed 0: its start, three moments between, its end.
 """
 
 from pathlib import Path

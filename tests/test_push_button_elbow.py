@@ -62,7 +62,7 @@ def test_standing_still_has_not_pressed_it(world: PushButtonElbow) -> None:
 
 @pytest.mark.parametrize("posture", [False, True])
 def test_the_hands_pose_says_nothing_of_the_elbow(world: PushButtonElbow, posture: bool) -> None:
-    """What the leader did, sent through task space, never lowers the elbow; through ERJ, it does."""
+    """A demonstration encoded in task space never lowers the elbow; encoded in ERJ, it does."""
     task = make_action_space("task", world.arm, posture=world.arm.home if posture else None)
     for space, outcome in ((task, ""), (make_action_space("erj", world.arm), "success")):
         world.reset(seed=0)

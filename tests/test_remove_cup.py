@@ -1,4 +1,4 @@
-"""Remove Cup and Reach & Remove Cup: what counts as out, what is said of a cup that does not come out."""
+"""Remove Cup and Reach & Remove Cup: success outside the cabinet, and the failures before it."""
 
 import gymnasium
 import numpy as np

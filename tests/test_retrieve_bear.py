@@ -1,4 +1,4 @@
-"""Retrieve Bear: what counts as a graze, what the elbow does to the clutter, where things stand."""
+"""Retrieve Bear: limits of displaced clutter, the effect of the elbow on it, and placements."""
 
 from collections.abc import Iterable
 
@@ -27,7 +27,7 @@ def still(world: RetrieveBear, gripper: float = 1.0) -> np.ndarray:
 
 
 def through_task_space(world: RetrieveBear, actions: Iterable[np.ndarray], posture: np.ndarray | None = None) -> str:
-    """What joint commands do when only the hand's pose is passed on."""
+    """Outcome of joint commands encoded in task space, which keeps the pose of the hand alone."""
     space = make_action_space("task", world.arm, posture=posture)
     encoded = [space.encode(action[:-1], action[-1]) for action in actions]
     decoded = (space.decode(action, seed=world.joint_positions) for action in encoded)

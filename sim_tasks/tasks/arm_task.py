@@ -39,7 +39,7 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
     of each object; ``pixels``: a (size, size, 3) uint8 image a camera, if cameras are asked for.
     Reward: the sum, in [0, 1], of the terms in ``info["reward_terms"]``; 1 if the goal holds.
     Every ``info`` has ``is_success`` and ``failure`` (empty while there is none) besides. Success and failure
-    terminate an episode; at the step limit it is truncated, and ``failure`` names what was missing.
+    terminate an episode; at the step limit it is truncated, and ``failure`` names the reason.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": RATE}  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -126,7 +126,7 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
 
     @abstractmethod
     def _fails(self) -> str:
-        """Name of a failure beyond repair, empty if there is none."""
+        """Name of an irreversible failure, empty if there is none."""
 
     def _collision(self) -> str:
         """Name of the failure if the robot collides with an obstacle in this state."""
@@ -134,7 +134,7 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
 
     @abstractmethod
     def _times_out(self) -> str:
-        """Name of what is missing if the step limit is reached in this state."""
+        """Name of the failure if the step limit is reached in this state."""
 
     @abstractmethod
     def _progress(self) -> dict[str, float]:

@@ -3,7 +3,7 @@
 Two constraints make the elbow matter. The robot has its back to a wall: while the hand is outside the
 cabinet, an elbow that points up leans back into the wall, so it must be swung out to the side. The
 compartment is narrow: deep inside, an elbow swung out drives the forearm into the side wall, so it
-must point up. It has to change on the way, while the hand is in the opening; no constant posture of
+must point up. It has to change while the hand is in the opening; no constant posture of
 the elbow, and no preference for small changes, satisfies both.
 """
 

@@ -70,7 +70,7 @@ class PickTask(ArmTask):
 
     @abstractmethod
     def _object_failure(self) -> str:
-        """Name of what happened to an object beyond repair, empty if nothing did."""
+        """Name of an object's irreversible failure, empty if there is none."""
 
     def _times_out(self) -> str:
         return "missed_grasp" if self.gripper_opening < self.closed and not self._held() else "timeout"
