@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from er_il.arms.arm import Arm
 from er_il.datasets.recipe import Recipe
@@ -18,7 +19,7 @@ from er_il.datasets.record import Record, Recorded, read_episodes, read_spec
 from er_il.envs.decoders import DECODERS, decoder
 from er_il.envs.tasks import task_id
 from er_il.envs.wrapper import DecodingEnv, make_decoding_env
-from er_il.evaluation.outcomes import summarise
+from er_il.evaluation.results import summarise
 from er_il.kinematics.rotation import Quaternion
 from er_il.spaces import from_spec, name_of
 from er_il.support.atomic_files import write_json
@@ -37,7 +38,7 @@ class Replayed:
     success: bool
     failure: str  # "" after success
     deviation: float  # [rad] largest distance of a joint from where it was in the demo at that step, pushed or not
-    joint_step: float  # [rad] largest joint change that a decoded action asked for
+    max_joint_step: float  # [rad] largest joint change that a decoded action asked for
     statuses: Counter[str]  # of decoding, one a step
 
 
@@ -57,14 +58,26 @@ class ReplayCell:
 
     def report(self) -> dict[str, Any]:
         """Return the cell as JSON."""
-        return summarise(self.task, self.decoder, self.demos) | {
-            "leader": {"starts": len(self.demos) + self.dropped.total(), "dropped": dict(self.dropped.most_common())},
-            "max_joint_deviation": max(demo.deviation for demo in self.demos),
-            "demos": [
-                {"seed": demo.seed, "success": demo.success, "failure": demo.failure, "max_deviation": demo.deviation}
-                for demo in self.demos
-            ],
-        }
+        return (
+            {"task": self.task, "decoder": self.decoder}
+            | summarise(pd.DataFrame(map(vars, self.demos)))
+            | {
+                "leader": {
+                    "starts": len(self.demos) + self.dropped.total(),
+                    "dropped": dict(self.dropped.most_common()),
+                },
+                "max_joint_deviation": max(demo.deviation for demo in self.demos),
+                "demos": [
+                    {
+                        "seed": demo.seed,
+                        "success": demo.success,
+                        "failure": demo.failure,
+                        "max_deviation": demo.deviation,
+                    }
+                    for demo in self.demos
+                ],
+            }
+        )
 
 
 def replay(datasets: Sequence[Path], workers: int, advance: Callable[[Path, str, int, int], None]) -> list[ReplayCell]:

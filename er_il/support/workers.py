@@ -1,80 +1,69 @@
-"""Worker processes that end with their parent, however it ends."""
+"""Worker processes that end with their parent, however it ends, and compute with one thread each."""
 
 import ctypes
 import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import Executor, Future
 from contextlib import contextmanager
-from multiprocessing import connection, get_context, parent_process
 from typing import Any
+
+from loky import ProcessPoolExecutor, cpu_count, get_reusable_executor
+
+# With two threads on two cores, a step of a small policy takes ten times as long as with one. Read by NumPy and
+# PyTorch when they are loaded: for processes that are about to start.
+ONE_THREAD = {"OMP_NUM_THREADS": "1"}
+# loky would replace a worker that has grown by 300 MB as a leaking one; importing LeRobot takes more.
+_ENVIRONMENT = ONE_THREAD | {"LOKY_MAX_MEMORY_LEAK_SIZE": "1e12"}
 
 _LIBC = ctypes.CDLL(None) if sys.platform == "linux" else None  # loaded here: little is safe between fork and exec
 _PR_SET_PDEATHSIG = 1
+_POLL = 0.5  # [s] between looks at the parent
 
 
 def cores() -> int:
     """Number of cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return cpu_count()
 
 
 @contextmanager
-def worker_pool(workers: int, initializer: Callable[..., None], *arguments: object) -> Iterator[ProcessPoolExecutor]:
-    """Yield a pool of fresh processes, each prepared by ``initializer(*arguments)``.
+def worker_pool(workers: int, initializer: Callable[..., None], *arguments: object) -> Iterator[Executor]:
+    """Yield a pool of fresh processes, each prepared by ``initializer(*arguments)``; they are killed at the end.
 
-    On an exception, jobs that have not started are dropped. Workers are spawned, not forked: OpenGL
-    contexts and the threads of PyTorch do not survive a fork.
+    loky starts them without a fork, which neither OpenGL contexts nor the threads of PyTorch survive.
     """
-    pool = _pool(workers, initializer, *arguments)
+    pool = ProcessPoolExecutor(workers, **_start_with(initializer, *arguments))
     try:
         yield pool
     finally:
-        pool.shutdown(cancel_futures=True)
+        pool.shutdown(kill_workers=True)
 
 
 class LocalExecutor:
-    """Runs functions in processes of this machine, one thread each; a process that died is replaced.
+    """Runs functions in processes of this machine; those that died are replaced.
 
     Use it in a ``with`` statement. What ran beside the process that died fails too, with
-    :class:`BrokenProcessPool`, and may be submitted again.
+    :class:`concurrent.futures.BrokenExecutor`, and may be submitted again.
     """
 
     def __init__(self, workers: int) -> None:
         self.workers = workers
 
     def __enter__(self) -> "LocalExecutor":
-        self._pool = _pool(self.workers, one_thread)
         return self
 
     def __exit__(self, *exception: object) -> None:
-        self._pool.shutdown(cancel_futures=True)
+        self._pool().shutdown(kill_workers=True)
 
     def submit(self, function: Callable[..., Any], /, *arguments: Any) -> "Future[Any]":
         """Run a function in one of the processes."""
-        try:
-            return self._pool.submit(function, *arguments)
-        except BrokenProcessPool:
-            self._pool.shutdown()
-            self._pool = _pool(self.workers, one_thread)
-            return self._pool.submit(function, *arguments)
+        return self._pool().submit(function, *arguments)
 
-
-def one_thread() -> None:
-    """Let this process compute with one thread: more than cores make small matrices ten times slower."""
-    os.environ["OMP_NUM_THREADS"] = "1"
-
-
-def end_with_parent() -> None:
-    """Let this process, of a program that knows nothing of us, be killed when its parent dies (on Linux)."""
-    if _LIBC is not None:
-        _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-
-
-def _pool(workers: int, initializer: Callable[..., None], *arguments: object) -> ProcessPoolExecutor:
-    return ProcessPoolExecutor(workers, get_context("spawn"), _start, (initializer, arguments))
+    def _pool(self) -> Any:
+        return get_reusable_executor(self.workers, **_start_with())  # a new one if the last is broken
 
 
 def run_jobs[T](
@@ -102,19 +91,29 @@ def run_jobs[T](
         return collect(job.result() for job in running)
 
 
+def end_with_parent() -> None:
+    """Let this process, of a program that knows nothing of us, be killed when its parent dies (on Linux)."""
+    if _LIBC is not None:
+        _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
 def _nothing() -> None:
     """Prepare nothing: the jobs bring all they need."""
 
 
-def _start(initializer: Callable[..., None], arguments: tuple[object, ...]) -> None:
-    # A parent that is killed cannot tell its workers; without this they would wait for jobs for ever.
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+def _start_with(initializer: Callable[..., None] = _nothing, *arguments: object) -> dict[str, Any]:
+    prepared = (os.getpid(), initializer, arguments)
+    return {"initializer": _start, "initargs": prepared, "env": _ENVIRONMENT, "timeout": None}
+
+
+def _start(parent: int, initializer: Callable[..., None], arguments: tuple[object, ...]) -> None:
+    # loky's workers outlive a parent that is killed: they finish their job, and wait for others for ever.
+    threading.Thread(target=_end_without, args=(parent,), daemon=True).start()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
     initializer(*arguments)
 
 
-def _end_with_parent() -> None:
-    parent = parent_process()
-    if parent is not None:
-        connection.wait([parent.sentinel])
-        os._exit(1)
+def _end_without(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(_POLL)
+    os._exit(1)
