@@ -24,7 +24,7 @@ from er_il.kinematics.rotation import Quaternion
 from er_il.spaces import from_spec, name_of
 from er_il.support.atomic_files import write_json
 from er_il.support.errors import DatasetError
-from er_il.support.workers import worker_pool
+from er_il.support.workers import LocalExecutor
 
 # [s] The last action is held that long at most: a grip found a little later than in the demo is a grip all the same.
 GRACE = 1.0
@@ -94,7 +94,7 @@ def replay(datasets: Sequence[Path], workers: int, advance: Callable[[Path, str,
     """
     plays = [(dataset, play, read_episodes(dataset)) for dataset in datasets for play in _plays(dataset)]
     cells = []
-    with worker_pool(workers, _prepare) as pool:
+    with LocalExecutor(workers, _prepare) as pool:
         running = [(path, play, [pool.submit(_replay, play, demo) for demo in demos]) for path, play, demos in plays]
         for path, play, jobs in running:
             done = []

@@ -3,7 +3,6 @@
 import json
 import os
 import re
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -53,22 +52,18 @@ class Demonstrate:
 
     @property
     def name(self) -> str:
-        """What it does, for people."""
         return f"demonstrate {self.task}"
 
     @property
     def size(self) -> int:
-        """Number of demonstrations."""
         return self.grid.recipe(self.task).episodes
 
     @property
     def log(self) -> Path:
-        """What went wrong, if something did."""
         return self.out.with_name(f"{self.out.name}.log")
 
     @property
     def done(self) -> bool:
-        """True if every dataset is there."""
         return all((self.out / space).exists() for space in self.spaces)
 
     def run(self) -> None:
@@ -95,7 +90,6 @@ class Train(FileResult):
 
     @property
     def name(self) -> str:
-        """What it does, for people."""
         return f"train {self.task} {self.space} on {self.demonstrations} demonstrations, seed {self.seed}"
 
     @property
@@ -113,12 +107,10 @@ class Train(FileResult):
 
     @property
     def size(self) -> int:
-        """Number of training steps."""
         return self.steps
 
     @property
     def progress(self) -> int:
-        """Number of steps that the running training has reported."""
         try:
             steps = _LOGGED_STEP.findall(self.log.read_text())
         except OSError:
@@ -160,23 +152,20 @@ class RollOut(FileResult):
 
     @property
     def name(self) -> str:
-        """What it does, for people."""
         last = self.first_seed + self.count - 1
         return f"roll out {self.decoder} from {self.first_seed} to {last} ({self.trained.name})"
 
     @property
     def size(self) -> int:
-        """Number of rollouts."""
         return self.count
 
     @property
     def needs(self) -> tuple[Job, ...]:
-        """The trained policy."""
         return (self.trained,)
 
     def run(self) -> None:
         """Roll out and write the rollouts, with what they cost."""
-        demos = _demos(self.trained.dataset, self.trained.demonstrations)
+        leader, elbow = _demonstrated(self.trained.dataset, self.trained.demonstrations)
         posture = POSTURE_BASELINES.get(self.decoder)
         with measured() as cost:
             rollouts = evaluate(
@@ -185,8 +174,8 @@ class RollOut(FileResult):
                 POSTURE_DECODER if posture else self.decoder,
                 episodes=self.count,
                 seed=self.first_seed,
-                posture=posture(demos.leader).tolist() if posture else (),
-                elbow=demos.elbow,
+                posture=posture(leader).tolist() if posture else (),
+                elbow=elbow,
             )
         save_rollouts(rollouts, self.path, _notes(cost))
 
@@ -204,12 +193,10 @@ class Film(FileResult):
 
     @property
     def name(self) -> str:
-        """What it does, for people."""
         return f"film {self.trained.task} through {self.decoder} from {self.seed}"
 
     @property
     def needs(self) -> tuple[Job, ...]:
-        """The trained policy."""
         return (self.trained,)
 
     @property
@@ -237,23 +224,16 @@ class Film(FileResult):
         trace.save(self.path)
 
 
-@dataclass(frozen=True)
-class _Demos:
-    """Demonstrations that a policy was trained on."""
-
-    leader: Sequence[NDArray[np.float64]]  # (T, n + 1) [rad], and the gripper's opening
-    elbow: ElbowReference | None
-
-
 @lru_cache(maxsize=4)  # jobs of one policy follow one another
-def _demos(dataset: Path, count: int) -> _Demos:
+def _demonstrated(dataset: Path, count: int) -> tuple[list[NDArray[np.float64]], ElbowReference | None]:
+    """The leader's paths (T, n + 1) [rad and opening] that a policy was trained on, and where the elbow was."""
     info = dataset_info(dataset)
     arm = from_spec(action_spec(info["features"])).arm
     episodes = read_episodes(dataset)
     chosen = [episodes[i] for i in train_episodes(info)[:count]]
     followed = [demo.state[:, : arm.dof].astype(np.float64) for demo in chosen]
     leader = [demo.leader.astype(np.float64) for demo in chosen]
-    return _Demos(leader, ElbowReference.of_demos(arm, 1 / info["fps"], followed))
+    return leader, ElbowReference.of_demos(arm, 1 / info["fps"], followed)
 
 
 def _notes(cost: Cost) -> dict[str, Any]:

@@ -68,12 +68,10 @@ class FileResult:
 
     @property
     def log(self) -> Path:
-        """What went wrong, if something did."""
         return self.path.with_suffix(".log")
 
     @property
     def done(self) -> bool:
-        """True if the result is there."""
         return self.path.exists()
 
 

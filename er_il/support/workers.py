@@ -6,12 +6,12 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import Executor, Future
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
+from concurrent.futures import BrokenExecutor, Executor, Future
+from functools import partial
 from typing import Any
 
-from loky import ProcessPoolExecutor, cpu_count, get_reusable_executor
+from loky import ProcessPoolExecutor, cpu_count
 
 # With two threads on two cores, a step of a small policy takes ten times as long as with one. Read by NumPy and
 # PyTorch when they are loaded: for processes that are about to start.
@@ -29,41 +29,36 @@ def cores() -> int:
     return cpu_count()
 
 
-@contextmanager
-def worker_pool(workers: int, initializer: Callable[..., None], *arguments: object) -> Iterator[Executor]:
-    """Yield a pool of fresh processes, each prepared by ``initializer(*arguments)``; they are killed at the end.
-
-    loky starts them without a fork, which neither OpenGL contexts nor the threads of PyTorch survive.
-    """
-    pool = ProcessPoolExecutor(workers, **_start_with(initializer, *arguments))
-    try:
-        yield pool
-    finally:
-        pool.shutdown(kill_workers=True)
-
-
-class LocalExecutor:
-    """Runs functions in processes of this machine; those that died are replaced.
+class LocalExecutor(Executor):
+    """Runs functions in fresh processes of this machine, which are killed at the end; those that died are replaced.
 
     Use it in a ``with`` statement. What ran beside the process that died fails too, with
-    :class:`concurrent.futures.BrokenExecutor`, and may be submitted again.
+    :class:`concurrent.futures.BrokenExecutor`, and may be submitted again. loky starts the processes without a
+    fork, which neither OpenGL contexts nor the threads of PyTorch survive.
+
+    Args:
+        workers: Number of processes.
+        initializer: Prepares each process.
+        arguments: Its arguments.
     """
 
-    def __init__(self, workers: int) -> None:
+    def __init__(self, workers: int, initializer: Callable[..., None] | None = None, *arguments: object) -> None:
         self.workers = workers
+        self._prepared = (os.getpid(), initializer, arguments)
+        self._pool = self._new_pool()
 
-    def __enter__(self) -> "LocalExecutor":
-        return self
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> "Future[Any]":
+        try:
+            return self._pool.submit(fn, *args, **kwargs)
+        except BrokenExecutor:
+            self._pool = self._new_pool()
+            return self._pool.submit(fn, *args, **kwargs)
 
-    def __exit__(self, *exception: object) -> None:
-        self._pool().shutdown(kill_workers=True)
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        self._pool.shutdown(wait, kill_workers=True)
 
-    def submit(self, function: Callable[..., Any], /, *arguments: Any) -> "Future[Any]":
-        """Run a function in one of the processes."""
-        return self._pool().submit(function, *arguments)
-
-    def _pool(self) -> Any:
-        return get_reusable_executor(self.workers, **_start_with())  # a new one if the last is broken
+    def _new_pool(self) -> ProcessPoolExecutor:
+        return ProcessPoolExecutor(self.workers, initializer=_start, initargs=self._prepared, env=_ENVIRONMENT)
 
 
 def run_jobs[T](
@@ -77,18 +72,12 @@ def run_jobs[T](
         advance: Called with the number of jobs done, and their total.
     """
     done: list[T] = []
-
-    def collect(results: Iterable[T]) -> list[T]:
-        for result in results:
-            done.append(result)
+    with LocalExecutor(workers) as executor:
+        calls = [partial(*job) if workers == 1 else executor.submit(*job).result for job in jobs]
+        for call in calls:
+            done.append(call())
             advance(len(done), len(jobs))
-        return done
-
-    if workers == 1:
-        return collect(function(*arguments) for function, *arguments in jobs)
-    with worker_pool(workers, _nothing) as pool:
-        running = [pool.submit(*job) for job in jobs]
-        return collect(job.result() for job in running)
+    return done
 
 
 def end_with_parent() -> None:
@@ -97,20 +86,12 @@ def end_with_parent() -> None:
         _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
-def _nothing() -> None:
-    """Prepare nothing: the jobs bring all they need."""
-
-
-def _start_with(initializer: Callable[..., None] = _nothing, *arguments: object) -> dict[str, Any]:
-    prepared = (os.getpid(), initializer, arguments)
-    return {"initializer": _start, "initargs": prepared, "env": _ENVIRONMENT, "timeout": None}
-
-
-def _start(parent: int, initializer: Callable[..., None], arguments: tuple[object, ...]) -> None:
+def _start(parent: int, initializer: Callable[..., None] | None, arguments: tuple[object, ...]) -> None:
     # loky's workers outlive a parent that is killed: they finish their job, and wait for others for ever.
     threading.Thread(target=_end_without, args=(parent,), daemon=True).start()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
-    initializer(*arguments)
+    if initializer:
+        initializer(*arguments)
 
 
 def _end_without(parent: int) -> None:
