@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 
 from er_il.support.errors import ErIlError
-from er_il.support.folder_lock import LOCK, folder_lock
+from er_il.support.folder_lock import folder_lock
 
 HOLDER = """
 import sys, time
 from pathlib import Path
 from er_il.support.folder_lock import folder_lock
-with folder_lock(Path(sys.argv[1]), "mark"):
+with folder_lock(Path(sys.argv[1])):
     print("in", flush=True)
     time.sleep(60)
 """
@@ -26,24 +26,12 @@ def test_a_second_command_is_refused_until_the_first_has_ended_however_it_ends(t
         assert holder.stdout.readline() == b"in\n"
         with (
             pytest.raises(ErIlError, match=r"Another command works in .*choose another --out"),
-            folder_lock(tmp_path, "mark"),
+            folder_lock(tmp_path),
         ):
             pass
     finally:
         holder.kill()
         holder.wait()
     for _ in range(2):
-        with folder_lock(tmp_path, "mark"):
+        with folder_lock(tmp_path):
             pass
-
-
-def test_a_folder_with_something_else_is_left_alone(tmp_path: Path) -> None:
-    (tmp_path / "thesis.tex").touch()
-    with pytest.raises(ErIlError, match="holds something else"), folder_lock(tmp_path, "mark"):
-        pass
-    assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
-    (tmp_path / "mark").touch()
-    with folder_lock(tmp_path, "mark"):
-        assert (tmp_path / LOCK).exists()
-    with folder_lock(tmp_path / "new" / "one", "mark"):
-        pass

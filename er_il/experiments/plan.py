@@ -24,7 +24,7 @@ from er_il.policy.actor import POLICY_ROWS
 from er_il.policy.configuration import default_config, default_steps
 from er_il.support.atomic_files import write_json
 from er_il.support.errors import ErIlError
-from er_il.support.folder_lock import folder_lock
+from er_il.support.folder_lock import LOCK, folder_lock
 
 OWNER = "benchmark.json"
 
@@ -45,7 +45,11 @@ class Plan:
             ErIlError: another command works in it, or it holds something else, demonstrations of another recipe
                 than today's, or policies trained by another configuration.
         """
-        with folder_lock(self.out, OWNER):
+        self.out.mkdir(parents=True, exist_ok=True)
+        found = {path.name for path in self.out.iterdir()}
+        if found - {LOCK} and OWNER not in found:  # left as it is, without a lock
+            raise ErIlError(f"{self.out} holds something else than an experiment; choose another --out.")
+        with folder_lock(self.out):
             self._claim()
             yield
 
