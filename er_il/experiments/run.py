@@ -67,9 +67,10 @@ def _run(
     schedule: Schedule, executor: Executor, progress: Progress, announce: Callable[[], None] = lambda: None
 ) -> None:
     """Run a schedule, with a progress bar for each stage."""
-    stages: dict[str, list[Job]] = {}
+    stages: dict[str, list[Job]] = {job.stage: [] for job in schedule.jobs if job not in schedule.done}
     for job in schedule.jobs:
-        stages.setdefault(job.stage, []).append(job)
+        if job.stage in stages:
+            stages[job.stage].append(job)
     bars = {name: progress.add_task(name, total=sum(job.size for job in jobs)) for name, jobs in stages.items()}
 
     def completed(job: Job) -> int:

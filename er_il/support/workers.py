@@ -30,9 +30,9 @@ def cores() -> int:
 
 
 class LocalExecutor(Executor):
-    """Runs functions in fresh processes of this machine, which are killed at the end; those that died are replaced.
+    """Runs functions in fresh processes of this machine; those that died are replaced.
 
-    Use it in a ``with`` statement. What ran beside the process that died fails too, with
+    Use it in a ``with`` statement, which an exception leaves at once: what still runs is killed. What ran beside the process that died fails too, with
     :class:`concurrent.futures.BrokenExecutor`, and may be submitted again. loky starts the processes without a
     fork, which neither OpenGL contexts nor the threads of PyTorch survive.
 
@@ -54,8 +54,8 @@ class LocalExecutor(Executor):
             self._pool = self._new_pool()
             return self._pool.submit(fn, *args, **kwargs)
 
-    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        self._pool.shutdown(wait, kill_workers=True)
+    def __exit__(self, kind: type[BaseException] | None, *rest: object) -> None:
+        self._pool.shutdown(kill_workers=kind is not None)
 
     def _new_pool(self) -> ProcessPoolExecutor:
         return ProcessPoolExecutor(self.workers, initializer=_start, initargs=self._prepared, env=_ENVIRONMENT)
