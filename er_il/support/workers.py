@@ -32,9 +32,9 @@ def cores() -> int:
 class LocalExecutor(Executor):
     """Runs functions in fresh processes of this machine; those that died are replaced.
 
-    Use it in a ``with`` statement, which an exception leaves at once: what still runs is killed. What ran beside the process that died fails too, with
-    :class:`concurrent.futures.BrokenExecutor`, and may be submitted again. loky starts the processes without a
-    fork, which neither OpenGL contexts nor the threads of PyTorch survive.
+    Use it in a ``with`` statement; an exception kills what still runs. What ran beside the process that died fails
+    too, with :class:`concurrent.futures.BrokenExecutor`, and may be submitted again. loky starts the processes
+    without a fork, which neither OpenGL contexts nor the threads of PyTorch survive.
 
     Args:
         workers: Number of processes.
