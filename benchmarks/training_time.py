@@ -22,9 +22,10 @@ from rich.progress import Progress
 from er_il.datasets.recipe import Recipe
 from er_il.datasets.recording import generate
 from er_il.policy.configuration import default_config
-from er_il.policy.training import IN_MEMORY, ONE_THREAD, STOCK, Training
+from er_il.policy.training import IN_MEMORY, STOCK, Training
 from er_il.support.atomic_files import write_json
 from er_il.support.provenance import provenance
+from er_il.support.workers import ONE_THREAD
 
 TASK, SPACE = "reach_cup", "erj"
 INPUTS = {"states": "", "states and a camera": "images_small"}  # and the configuration's kind

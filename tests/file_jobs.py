@@ -26,6 +26,8 @@ class FileJob(FileResult):
     accident: str = ""  # "fail": raises; "die": kills its process the first time
     sleep: float = 0.0  # [s]
 
+    stage = "Compute"
+
     @property
     def name(self) -> str:
         return self.path.stem

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 import yaml
 from documented import documented, run, train_in_process
@@ -19,12 +20,13 @@ from er_il.arms.arm import Arm
 from er_il.cli.benchmark import benchmark
 from er_il.evaluation.elbow import ElbowReference
 from er_il.evaluation.posture_baselines import grasp_posture, mean_posture
-from er_il.evaluation.rollouts import Cell, Episode
-from er_il.experiments.grid import Entry, Grid, GridError
+from er_il.evaluation.results import long_form, report_cells
+from er_il.evaluation.rollouts import Rollout
+from er_il.experiments.films import telling_seed
+from er_il.experiments.grid import Cell, Grid, GridError
 from er_il.experiments.plan import Plan
-from er_il.experiments.report import cell_report, write_results
+from er_il.experiments.results import write_results
 from er_il.experiments.schedule import Schedule
-from er_il.experiments.strip import strips
 from er_il.policy.training import PRECISION
 from er_il.report.benchmark_page import write_pages
 from er_il.report.benchmark_table import compact_table
@@ -58,18 +60,22 @@ def test_mistakes_in_a_grid_name_the_valid_choices(tmp_path: Path) -> None:
         grid(tasks=["cup"])
     with pytest.raises(UnknownNameError, match=r"Unknown decoder 'task'. Valid: .*task-nearest"):
         grid(decoders=["task"])
-    with pytest.raises(UnknownNameError, match=r"Unknown sceptic's decoder 'joint'. Valid: task-mean, task-grasp"):
-        grid(sceptics=["joint"])
-    with pytest.raises(GridError, match="list it under sceptics"):
+    with pytest.raises(UnknownNameError, match=r"Unknown posture baseline 'joint'. Valid: task-mean, task-grasp"):
+        grid(posture_baselines=["joint"])
+    with pytest.raises(GridError, match="list it under posture_baselines"):
         grid(decoders=["task-mean"])
-    with pytest.raises(GridError, match="tasks is 'reach_cup', not a list of names"):
+    with pytest.raises(GridError, match="tasks is 'reach_cup': Input should be a valid tuple"):
         grid(tasks="reach_cup")
     with pytest.raises(GridError, match="training_seeds names 1 twice"):
         grid(training_seeds=[1, 1])
-    with pytest.raises(GridError, match="decoders is empty"):
+    with pytest.raises(GridError, match=r"decoders is \[\]: Tuple should have at least 1 item"):
         grid(decoders=[])
-    with pytest.raises(GridError, match="rollouts is 0"):
+    with pytest.raises(GridError, match="rollouts is 0: Input should be greater than or equal to 1"):
         grid(rollouts=0)
+    with pytest.raises(GridError, match=r"training_seeds.1 is -1: Input should be greater than or equal to 0"):
+        grid(training_seeds=[0, -1])
+    with pytest.raises(GridError, match="steps is True: Input should be a valid integer"):
+        grid(steps=True)
     with pytest.raises(GridError, match="demonstrations holds 33, but the recipe of reach_cup has 32"):
         grid(demonstrations=[4, 33], episodes=None)
     with pytest.raises(UnknownNameError, match=r"Unknown configuration 'pixels'. Valid: images, images_small"):
@@ -80,12 +86,12 @@ def test_mistakes_in_a_grid_name_the_valid_choices(tmp_path: Path) -> None:
         grid(cameras={"reach_cup": ["wrist"]})
     with pytest.raises(GridError, match="cameras names lift_cup, which the grid does not have"):
         grid(cameras={"lift_cup": ["wrist"]})
-    with pytest.raises(GridError, match=r"cameras is \['wrist'\], not a list of cameras for each task"):
+    with pytest.raises(GridError, match=r"cameras is \['wrist'\]: Input should be a valid dictionary"):
         grid(cameras=["wrist"])
     with pytest.raises(GridError, match="There is no grid"):
         Grid.from_file(tmp_path / "none.yaml")
     (tmp_path / "grid.yaml").write_text(yaml.safe_dump(TINY | {"rollouts": "many"}))
-    with pytest.raises(GridError, match=r"grid.yaml: rollouts is 'many', not a whole number"):
+    with pytest.raises(GridError, match=r"grid.yaml: rollouts is 'many': Input should be a valid integer"):
         Grid.from_file(tmp_path / "grid.yaml")
 
 
@@ -96,16 +102,25 @@ def test_the_shipped_grids_are_grids(name: str) -> None:
     assert "joint" in shipped.decoders  # the others are compared with it
 
 
+def test_grids_of_version_0_1_0_are_read() -> None:
+    assert grid(sceptics=["task-mean"]) == grid(posture_baselines=["task-mean"])
+    results = json.loads((Path(__file__).parents[1] / "results/table1/results.json").read_text())
+    assert Grid.from_dict(results["meta"]["grid"]).posture_baselines == ("task-mean", "task-grasp")
+
+
 def test_jobs_differ_wherever_their_results_may(tmp_path: Path) -> None:
     wide = grid(
-        decoders=["joint", "task-nearest", "task-posture"], training_seeds=[0, 1], rollouts=60, sceptics=["task-mean"]
+        decoders=["joint", "task-nearest", "task-posture"],
+        training_seeds=[0, 1],
+        rollouts=60,
+        posture_baselines=["task-mean"],
     )
     jobs = Plan(wide, tmp_path).jobs
     assert len({job.path for job in jobs}) == len({job.name for job in jobs}) == len(jobs) == (3 * 2 + 1) * 3
     assert sorted((job.first_seed, job.count) for job in jobs[:3]) == [(1000, 25), (1025, 25), (1050, 10)]
     trained = {job.decoder: job.trained for job in jobs if job.trained.seed == 0}
     assert trained["task-nearest"] == trained["task-posture"] == trained["task-mean"] != trained["joint"]
-    assert [job.decoder for job in jobs if job.trained.seed == 1].count("task-mean") == 0  # a sceptic's: first seed
+    assert [job.decoder for job in jobs if job.trained.seed == 1].count("task-mean") == 0  # first seed only
     other = Plan(grid(steps=3), tmp_path).jobs
     assert not {job.path for job in other} & {job.path for job in jobs}
 
@@ -114,10 +129,10 @@ def test_images_are_recorded_and_learnt_from_where_a_grid_says_so(tmp_path: Path
     seeing = grid(configuration="images_small", cameras={"reach_cup": ["wrist"]})
     assert Grid.from_dict(seeing.to_dict()) == seeing
     assert (seeing.recipe("reach_cup").cameras, grid().recipe("reach_cup").cameras) == (("wrist",), ())
-    assert len(Schedule([*Plan(seeing, tmp_path).jobs, *Plan(grid(), tmp_path).jobs]).waiting) == 10  # none is shared
-    Plan(seeing, tmp_path / "mine").claim()
+    assert len(Schedule([*Plan(seeing, tmp_path).jobs, *Plan(grid(), tmp_path).jobs]).jobs) == 10  # none is shared
+    claim(seeing, tmp_path / "mine")
     with pytest.raises(ErIlError, match="trained by other configurations than today's, of joint, task"):
-        Plan(grid(), tmp_path / "mine").claim()
+        claim(grid(), tmp_path / "mine")
 
 
 def test_a_grid_without_the_reference_is_reported_without_differences(tmp_path: Path) -> None:
@@ -127,33 +142,47 @@ def test_a_grid_without_the_reference_is_reported_without_differences(tmp_path: 
 def test_a_folder_belongs_to_one_grid(tmp_path: Path) -> None:
     (tmp_path / "strange").mkdir()
     (tmp_path / "strange" / "thesis.tex").touch()
-    with pytest.raises(ErIlError, match="something else than a benchmark"):
-        Plan(grid(), tmp_path / "strange").claim()
-    Plan(grid(), tmp_path / "mine").claim()
-    Plan(grid(decoders=["joint", "erj"], rollouts=9), tmp_path / "mine").claim()  # it may grow
+    with pytest.raises(ErIlError, match="something else than an experiment"):
+        claim(grid(), tmp_path / "strange")
+    claim(grid(), tmp_path / "mine")
+    claim(grid(decoders=["joint", "erj"], rollouts=9), tmp_path / "mine")  # it may grow
     with pytest.raises(ErIlError, match="belongs to the grid 'Tiny'"):
-        Plan(grid(title="Other"), tmp_path / "mine").claim()
+        claim(grid(title="Other"), tmp_path / "mine")
     owner = tmp_path / "mine" / "benchmark.json"
-    claim = json.loads(owner.read_text())
-    claim["configurations"]["erj"]["policy"]["dim_model"] = 7
-    owner.write_text(json.dumps(claim))
+    found = json.loads(owner.read_text())
+    found["configurations"]["erj"]["policy"]["dim_model"] = 7
+    owner.write_text(json.dumps(found))
     with pytest.raises(ErIlError, match="trained by other configurations than today's, of erj"):
-        Plan(grid(decoders=["erj"]), tmp_path / "mine").claim()
+        claim(grid(decoders=["erj"]), tmp_path / "mine")
+    with Plan(grid(), tmp_path / "busy").claimed():
+        before = (tmp_path / "busy" / "benchmark.json").read_text()
+        with pytest.raises(ErIlError, match="Another command works in"):
+            claim(grid(decoders=["era"]), tmp_path / "busy")
+        assert (tmp_path / "busy" / "benchmark.json").read_text() == before
 
 
-def cell(decoder: str, outcomes: str) -> Cell:
-    """Rollouts from an outcome each: o succeeds, x collides."""
-    episodes = [
-        Episode(1000 + i, each == "o", "" if each == "o" else "collision", Counter(ok=2), (1e-3, 2e-3), 0.1, 0.01 * i)
-        for i, each in enumerate(outcomes)
-    ]
-    return Cell("reach_cup", decoder, tuple(episodes))
+def claim(of_grid: Grid, folder: Path) -> None:
+    with Plan(of_grid, folder).claimed():
+        pass
+
+
+def cell(decoder: str, *outcomes: str) -> pd.DataFrame:
+    """Rollouts of a policy a training seed, from an outcome each: o succeeds, x collides."""
+    return long_form(
+        (
+            {"task": "reach_cup", "decoder": decoder, "demonstrations": 32, "training_seed": seed},
+            [
+                Rollout(1000 + i, o == "o", "" if o == "o" else "collision", Counter(ok=2), (1e-3, 2e-3), 0.1, 0.01 * i)
+                for i, o in enumerate(of_seed)
+            ],
+        )
+        for seed, of_seed in enumerate(outcomes)
+    )
 
 
 def test_a_cell_is_pooled_over_training_seeds_and_paired_by_them() -> None:
-    joint = {0: cell("joint", "oooo"), 1: cell("joint", "ooox")}
-    erj = {0: cell("erj", "oxoo"), 1: cell("erj", "oooo")}
-    report = cell_report(Entry("reach_cup", "erj", 32), erj, joint)
+    joint, erj = cell("joint", "oooo", "ooox"), cell("erj", "oxoo", "oooo")
+    reference, report = report_cells(pd.concat([joint, erj]))
     assert (report["successes"], report["episodes"], report["demonstrations"]) == (7, 8, 32)
     assert report["interval"] == pytest.approx([0.4735, 0.9968], abs=1e-4)
     assert [(each["training_seed"], each["successes"], each["episodes"]) for each in report["per_seed"]] == [
@@ -164,7 +193,16 @@ def test_a_cell_is_pooled_over_training_seeds_and_paired_by_them() -> None:
     assert paired["difference"] == 0.0  # one pair better, one worse
     assert paired["interval"] == pytest.approx([-0.3921, 0.3921], abs=1e-3)
     assert report["elbow_error"] == pytest.approx(0.015)
-    assert "difference_to_joint" not in cell_report(Entry("reach_cup", "joint", 32), joint, joint)
+    assert reference["successes"] == 7 and "difference_to_joint" not in reference
+    _, first_seed_only = report_cells(pd.concat([joint, cell("task-mean", "xooo")]))
+    assert first_seed_only["difference_to_joint"]["difference"] == -0.25
+    (alone,) = report_cells(erj)
+    assert "difference_to_joint" not in alone
+
+
+def test_the_filmed_start_is_where_task_space_collides_and_the_others_succeed() -> None:
+    rollouts = pd.concat([cell("joint", "oxoo"), cell("erj", "ooox"), cell("task-nearest", "oxxx")])
+    assert telling_seed(rollouts) == 1002
 
 
 def test_postures_of_the_demonstrations() -> None:
@@ -196,12 +234,9 @@ def test_the_elbow_is_compared_where_the_hand_is_and_when_it_is_there() -> None:
 def report(successes: int = 150) -> dict[str, Any]:
     """The report of a grid of one task, all by one seed."""
     shapes = [("joint", 200), ("erj", 199), ("task-nearest", 3), ("task-grasp", successes)]
-    cells = []
-    for name, count in shapes:
-        entry = Entry("reach_cup", name, 32)
-        by_seed = {0: cell(name, "o" * count + "x" * (200 - count))}
-        cells.append(cell_report(entry, by_seed, {0: cell("joint", "o" * 200)}))
-    values = TINY | {"decoders": ["joint", "erj", "task-nearest"], "sceptics": ["task-grasp"], "demonstrations": [32]}
+    cells = report_cells(pd.concat([cell(name, "o" * count + "x" * (200 - count)) for name, count in shapes]))
+    values = TINY | {"decoders": ["joint", "erj", "task-nearest"], "posture_baselines": ["task-grasp"]}
+    values |= {"demonstrations": [32]}
     meta = {
         "versions": {"python": "3.12"},
         "machine": {"processor": "a processor", "cores": 2},
@@ -231,7 +266,9 @@ def test_the_page_shows_what_was_counted(tmp_path: Path) -> None:
     assert "200 rollouts a cell instead of 10" in page
     assert "It is not enough on: `reach_cup`" in page
     assert imread(tmp_path / "table.png").std() > 0.05
-    (tmp_path / "results.json").write_text(json.dumps(report(successes=200)))
+    values = report(successes=200)
+    values["meta"]["grid"]["sceptics"] = values["meta"]["grid"].pop("posture_baselines")  # as in version 0.1.0
+    (tmp_path / "results.json").write_text(json.dumps(values))
     write_pages(tmp_path)
     assert "That is enough on: `reach_cup` (`task-grasp`)" in (tmp_path / "README.md").read_text()
 
@@ -268,9 +305,8 @@ def test_a_grid_from_end_to_end(
     out = Path("outputs/benchmark/table1").resolve()
     file.parent.mkdir()
     file.write_text(yaml.safe_dump(TINY | short))
-    plan = Plan(grid(**short), out)
-    plan.claim()
-    in_the_way = plan.training(Entry(TASK, "task-nearest", 1), 0).out / "thesis.tex"
+    claim(grid(**short), out)
+    in_the_way = Plan(grid(**short), out).training(Cell(TASK, "task-nearest", 1), 0).out / "thesis.tex"
     in_the_way.parent.mkdir(parents=True)
     in_the_way.touch()
 
@@ -283,8 +319,7 @@ def test_a_grid_from_end_to_end(
 
     in_the_way.unlink()
     before = written(out)
-    grown = Plan(grid(sceptics=["task-grasp"], **short), out)
-    grown.claim()
+    grown = Plan(grid(posture_baselines=["task-grasp"], **short), out)
     monkeypatch.setenv(PRECISION, "bf16")
     executor = InOrder()
     schedule = Schedule(grown.jobs)
@@ -313,10 +348,6 @@ def test_a_grid_from_end_to_end(
     assert (costs["trainings"], costs["rollouts"]) == (2, 6) and min(
         costs["training_cpu_s"], costs["rollout_cpu_s"]
     ) > 0
-
-    drawing = Schedule(strips(Plan(grid(**short), out)).values())
-    drawing.run(InOrder())
-    assert not drawing.failed
 
     table = (results / "episodes.csv.gz").read_bytes()
     run("er-il", *documented("docs/table.md", "er-il benchmark"))  # all is there: it is only reported again

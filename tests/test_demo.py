@@ -1,4 +1,4 @@
-"""The main job end to end, small: demonstrations, trainings, rollouts, report; interrupted and resumed."""
+"""The demo end to end, small: demonstrations, trainings, rollouts, films, report; resumed."""
 
 import json
 import sys
@@ -6,57 +6,72 @@ from pathlib import Path
 
 import pytest
 from documented import documented
-from rich.progress import Progress
 
 from er_il.cli import main
-from er_il.experiments.demo import Demo
-from er_il.support.errors import ErIlError, UnknownNameError
+from er_il.experiments.demo import demo_grid
+from er_il.experiments.grid import GridError
+from er_il.support.errors import UnknownNameError
+
+SMALL = {"decoders": "erj,task-nearest", "demonstrations": "2", "steps": "2", "rollouts": "2"}
 
 
-def small(out: Path, **kwargs: object) -> Demo:
-    options = {"decoders": ("erj", "task-nearest"), "demonstrations": 2, "steps": 2, "rollouts": 2} | kwargs
-    return Demo(out, **options)  # pyright: ignore[reportArgumentType]
+def run(monkeypatch: pytest.MonkeyPatch, out: Path, **changes: str) -> None:
+    options = [word for key, value in (SMALL | changes).items() for word in (f"--{key}", value)]
+    monkeypatch.setattr(sys, "argv", ["er-il", *documented("README.md", "er-il demo"), "--out", str(out), *options])
+    main()
 
 
 @pytest.mark.slow
-def test_the_demo_makes_its_report_and_does_nothing_twice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_demo_makes_its_report_and_does_nothing_twice(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     out = tmp_path / "demo"
-    options = ["--decoders", "erj,task-nearest", "--demonstrations", "2", "--steps", "2", "--rollouts", "2"]
-    monkeypatch.setattr(sys, "argv", ["er-il", *documented("README.md", "er-il demo"), "--out", str(out), *options])
-    main()
-    report = json.loads((out / "report.json").read_text())
+    run(monkeypatch, out)
+    report = json.loads((out / "results.json").read_text())
     assert [(cell["decoder"], cell["episodes"]) for cell in report["cells"]] == [("erj", 2), ("task-nearest", 2)]
-    assert report["meta"]["training_steps"] == 2
-    assert report["meta"]["demonstrations"] == 2
-    page = (out / "report.md").read_text()
+    assert report["meta"]["training_steps"] == {"erj": 2, "task": 2}
+    grid = report["meta"]["grid"]
+    assert (grid["episodes"], grid["demonstrations"]) == (2, [1])
+    page = (out / "README.md").read_text()
     for cell in report["cells"]:
         assert f"**{cell['successes']}/{cell['episodes']}**" in page
-    made = ["success.png", "strip.png", "rollouts.webp", "episodes.csv"]
+    made = ["table.png", "strip_reach_cup.png", "rollouts.webp", "episodes.csv.gz"]
     made += [f"{name}{suffix}" for name in ("erj", "task-nearest") for suffix in (".mp4", ".rrd", ".npz")]
     for name in made:
         assert (out / name).stat().st_size > 100, name
-    when = {path: path.stat().st_mtime_ns for path in out.rglob("*.mp4")} | {
-        path: path.stat().st_mtime_ns for path in (out / "policies").rglob("*.safetensors")
-    }
-    with Progress(disable=True) as progress:
-        cells = small(out).run(progress, workers=2)
-    assert [cell.report() for cell in cells] == report["cells"]
-    assert all(path.stat().st_mtime_ns == at for path, at in when.items())
-    with pytest.raises(ErIlError, match="holds a demo with seed 0, not 1"):
-        small(out, seed=1).claim()
+    work = [*out.rglob("*.mp4"), *out.rglob("*.safetensors"), *out.rglob("*.parquet"), *out.rglob("1000-1001.json")]
+    when = {path: path.stat().st_mtime_ns for path in work}
+    run(monkeypatch, out)
+    again = json.loads((out / "results.json").read_text())
+    assert again["cells"] == report["cells"]
+    assert {path: path.stat().st_mtime_ns for path in work} == when
+    capsys.readouterr()
+    with pytest.raises(SystemExit, match="2"):
+        run(monkeypatch, out, seed="1")
+    assert "holds another recipe's demonstrations; asked for is seed 1 instead of 0" in capsys.readouterr().err
 
 
-def test_a_folder_with_something_else_is_left_alone(tmp_path: Path) -> None:
+def test_a_folder_with_something_else_is_left_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "thesis.tex").touch()
-    with pytest.raises(ErIlError, match="holds something else than a demo"):
-        small(tmp_path).claim()
+    with pytest.raises(SystemExit, match="2"):
+        run(monkeypatch, tmp_path)
+    assert "holds something else" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
 
 
-def test_wrong_names_and_numbers_list_the_valid_ones(tmp_path: Path) -> None:
+def test_a_demo_trains_on_what_its_recipe_does_not_hold_out() -> None:
+    grid = demo_grid("reach_cup", 3, ("joint", "era"), 50, None, None)
+    recipe = grid.recipe("reach_cup")
+    assert grid.demonstrations == (recipe.episodes - recipe.validation,) == (32,)
+    assert (recipe.seed, grid.training_seeds) == (3, (3,))
+
+
+def test_wrong_names_and_numbers_list_the_valid_ones() -> None:
     with pytest.raises(UnknownNameError, match=r"Unknown decoder 'task'. Valid: .*task-nearest"):
-        small(tmp_path, decoders=("task",))
+        demo_grid("reach_cup", 0, ("task",), 2, 2, 2)
     with pytest.raises(UnknownNameError, match=r"Unknown task 'cup'. Valid: .*reach_cup"):
-        small(tmp_path, task="cup")
-    with pytest.raises(ErIlError, match="0 rollouts"):
-        small(tmp_path, rollouts=0)
+        demo_grid("cup", 0, ("joint",), 2, 2, 2)
+    with pytest.raises(GridError, match="rollouts is 0: Input should be greater than or equal to 1"):
+        demo_grid("reach_cup", 0, ("joint",), 0, 2, 2)

@@ -15,8 +15,8 @@ from lerobot.policies.act.modeling_act import ACTPolicy
 from er_il import Arm, make_action_space
 from er_il.envs.contract import Contract
 from er_il.evaluation.recording import record_rollout
-from er_il.evaluation.results import load_cell, save_cell, write_cells
-from er_il.evaluation.rollouts import Cell, Episode, evaluate
+from er_il.evaluation.results import as_csv, load_notes, load_rollouts, long_form, save_rollouts, summarise
+from er_il.evaluation.rollouts import Rollout, evaluate
 from er_il.support.counts import tally
 from er_il.support.errors import ErIlError, PolicyError, UnknownNameError
 
@@ -60,8 +60,8 @@ def _untrained(kind: str, folder: Path) -> Path:
     return folder
 
 
-def outcomes(cell: Cell) -> list[tuple[object, ...]]:
-    return [(e.seed, e.success, e.failure, e.statuses, e.steps, e.joint_step) for e in cell.episodes]
+def outcomes(rollouts: list[Rollout]) -> list[tuple[object, ...]]:
+    return [(e.seed, e.success, e.failure, e.statuses, e.steps, e.joint_step) for e in rollouts]
 
 
 @pytest.mark.slow
@@ -73,14 +73,13 @@ def test_neither_the_batch_nor_the_number_of_episodes_changes_an_outcome(policie
     assert [seed for seed, *_ in outcomes(runs[0])] == [1000, 1001, 1002, 1003]
     assert outcomes(runs[0]) == outcomes(runs[1])
     assert outcomes(runs[2]) == outcomes(runs[0])[:3]
-    assert len({e.joint_step for e in runs[0].episodes}) == 4  # or equality would say nothing
+    assert len({e.joint_step for e in runs[0]}) == 4  # or equality would say nothing
 
 
 def test_both_decoders_of_task_space_take_the_task_policy(policies: dict[str, Path]):
     for name in ("task-nearest", "task-posture"):
-        report = evaluate(policies["task"], "reach_cup", name, episodes=1).report()
-        assert (report["task"], report["decoder"], report["episodes"]) == ("reach_cup", name, 1)
-        assert sum(report["statuses"].values()) == report["mean_steps"]
+        (rollout,) = evaluate(policies["task"], "reach_cup", name, episodes=1)
+        assert rollout.statuses.total() == rollout.steps
 
 
 def test_a_policy_of_another_space_is_refused(policies: dict[str, Path]):
@@ -99,41 +98,44 @@ def test_mistakes(policies: dict[str, Path], tmp_path: Path):
         evaluate(tmp_path, "reach_cup", "erj")
 
 
-def episode(seed: int, failure: str = "", joint_step: float = 0.1) -> Episode:
-    return Episode(seed, not failure, failure, Counter(ok=3, jump=1), (1e-3, 1e-3, 1e-3, 9e-3), joint_step)
+def rollout(seed: int, failure: str = "", joint_step: float = 0.1) -> Rollout:
+    return Rollout(seed, not failure, failure, Counter(ok=3, jump=1), (1e-3, 1e-3, 1e-3, 9e-3), joint_step)
 
 
-def test_the_report_counts(tmp_path: Path):
-    cell = Cell("reach_cup", "erj", (episode(7), episode(8, "collision", 0.4), episode(9, "timeout"), episode(10)))
-    write_cells([cell], {"first_seed": 7}, tmp_path / "new")
-    written = json.loads((tmp_path / "new" / "report.json").read_text())
-    assert written["meta"] == {"first_seed": 7}
-    report = written["cells"][0]
+def test_the_report_counts():
+    rollouts = [rollout(7), rollout(8, "collision", 0.4), rollout(9, "timeout"), rollout(10)]
+    frame = long_form([({"task": "reach_cup", "decoder": "erj", "training_seed": 3}, rollouts)])
+    report = summarise(frame)
     assert (report["successes"], report["episodes"]) == (2, 4)
     assert report["interval"] == pytest.approx([0.0676, 0.9324], abs=1e-4)
     assert report["failures"] == {"collision": 1, "timeout": 1}
+    assert report["statuses"] == {"ok": 12, "jump": 4}
     assert report["invalid_rate"] == pytest.approx(0.25)
     assert report["decode_p50_ms"] == pytest.approx(1.0)
     assert report["max_joint_step"] == pytest.approx(0.4)
-    with (tmp_path / "new" / "episodes.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    assert [(row["seed"], row["success"], row["failure"]) for row in rows] == [
-        ("7", "1", ""),
-        ("8", "0", "collision"),
-        ("9", "0", "timeout"),
-        ("10", "1", ""),
+    assert report["mean_steps"] == 4
+    assert "elbow_error" not in report  # none was measured
+    json.dumps(report)
+    rows = list(csv.DictReader(as_csv(frame).splitlines()))
+    assert [(row["training_seed"], row["seed"], row["success"], row["failure"]) for row in rows] == [
+        ("3", "7", "1", ""),
+        ("3", "8", "0", "collision"),
+        ("3", "9", "0", "timeout"),
+        ("3", "10", "1", ""),
     ]
-    assert not list((tmp_path / "new").glob("*.partial*"))
+    assert rows[1]["max_joint_step"] == "0.400000" and rows[1]["elbow_error"] == ""
 
 
-def test_a_saved_cell_is_the_cell(tmp_path: Path):
-    cell = Cell("reach_cup", "erj", (episode(7), episode(8, "collision", 0.4)))
-    save_cell(cell, tmp_path / "new" / "cell.json")
-    assert load_cell(tmp_path / "new" / "cell.json") == cell
+def test_saved_rollouts_are_the_rollouts(tmp_path: Path):
+    rollouts = [rollout(7), rollout(8, "collision", 0.4)]
+    save_rollouts(rollouts, tmp_path / "new" / "rollouts.json", {"git": "0123abc"})
+    assert load_rollouts(tmp_path / "new" / "rollouts.json") == rollouts
+    assert load_notes(tmp_path / "new" / "rollouts.json") == {"git": "0123abc"}
+    assert [path.name for path in (tmp_path / "new").iterdir()] == ["rollouts.json"]
 
 
 def test_a_recorded_rollout_is_the_evaluated_one(policies: dict[str, Path]):
-    evaluated = evaluate(policies["erj"], "reach_cup", "erj", episodes=2).episodes[1]
+    evaluated = evaluate(policies["erj"], "reach_cup", "erj", episodes=2)[1]
     trace, pictures = record_rollout(policies["erj"], "reach_cup", "erj", evaluated.seed, film_every=50)
     assert trace.outcome == evaluated.failure
     assert Counter(trace.status) == evaluated.statuses

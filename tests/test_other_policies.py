@@ -36,5 +36,5 @@ def test_diffusion_trains_on_an_er_dataset_and_rolls_out(tmp_path: Path, monkeyp
     run("er-il", *documented("docs/policies.md", "er-il eval"), "--episodes", "1", "--out", "first")
     (first,) = json.loads(Path("first/report.json").read_text())["cells"]
     # The noise is drawn anew in every rollout, from the rollout's seed.
-    second = evaluate(policy, "reach_cup", "erj", episodes=1).episodes[0]
+    second = evaluate(policy, "reach_cup", "erj", episodes=1)[0]
     assert (first["mean_steps"], first["max_joint_step"]) == (second.steps, second.joint_step)

@@ -1,8 +1,14 @@
 """``er-il benchmark``: a grid of tasks, decoders and training seeds, run and reported."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tyro.conf import Positional
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from er_il.experiments.run import Outcome
 
 
 def benchmark(
@@ -20,30 +26,36 @@ def benchmark(
         ray_address: Address of a Ray cluster to run on, such as 10.0.0.5:6379, whose machines share the folder
             ``out``; the cores of this machine if omitted.
     """
-    import sys
-
     from rich.console import Console
 
     from er_il.experiments.grid import Grid
 
     asked = Grid.from_file(grid)  # seconds of imports follow: mistakes are told before
-    from er_il.cli.table import results_table
+    from er_il.cli.progress import make_progress
     from er_il.experiments.cluster import RayExecutor
     from er_il.experiments.plan import Plan
     from er_il.experiments.run import run
-    from er_il.report.benchmark_page import PAGE
-    from er_il.support.folder_lock import sole_use
     from er_il.support.workers import LocalExecutor, cores
 
     plan = Plan(asked, (out or Path("outputs/benchmark") / grid.stem).resolve())
-    plan.claim()
     folder, console = results or Path("results") / grid.stem, Console()
-    with sole_use(plan.out), RayExecutor(ray_address) if ray_address else LocalExecutor(cores()) as executor:
-        outcome = run(plan, executor, console, folder)
+    workplace = RayExecutor(ray_address) if ray_address else LocalExecutor(cores())
+    with workplace as executor, make_progress(console) as progress:
+        outcome = run(plan, executor, progress, folder)
+    report(console, outcome, folder)
+
+
+def report(console: "Console", outcome: "Outcome", folder: Path) -> None:
+    """Print the results of an experiment and what is missing; exit with 1 if cells are incomplete."""
+    import sys
+
+    from er_il.cli.table import results_table
+    from er_il.report.benchmark_page import PAGE
+
     console.print(results_table(outcome.report["cells"]))
     console.print(f"{folder / PAGE}", highlight=False, soft_wrap=True)
-    for message in outcome.undrawn:
-        console.print(f"No strip: {message}", highlight=False)
+    for message in outcome.unfilmed:
+        console.print(f"No film: {message}", highlight=False)
     for message in outcome.failures:
         console.print(f"Failed: {message}", style="red", highlight=False)
     if outcome.failures:

@@ -28,16 +28,13 @@ def demo(
     """
     from rich.console import Console
 
+    from er_il.cli.benchmark import report
     from er_il.cli.progress import make_progress
-    from er_il.cli.table import results_table
-    from er_il.experiments.demo import TASK, Demo
-    from er_il.report.success import PAGE
-    from er_il.support.workers import cores
+    from er_il.experiments.demo import TASK, demo_grid, run_demo
 
     folder = out or Path("outputs") / ("demo" if task == TASK else task)
-    run = Demo(folder, seed, task, tuple(decoders.split(",")), rollouts, demonstrations, steps)
+    grid = demo_grid(task, seed, tuple(decoders.split(",")), rollouts, demonstrations, steps)
     console = Console()
     with make_progress(console) as progress:
-        cells = run.run(progress, cores())
-    console.print(results_table([cell.report() for cell in cells]))
-    console.print(f"{folder / PAGE}", highlight=False)
+        outcome = run_demo(grid, folder, progress)
+    report(console, outcome, folder)

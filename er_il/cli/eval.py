@@ -29,16 +29,17 @@ def eval(
     from rich.console import Console
 
     from er_il.cli.progress import make_progress
-    from er_il.evaluation.results import write_cells
+    from er_il.evaluation.results import COUNTS, as_csv, long_form, summarise
     from er_il.evaluation.rollouts import evaluate
     from er_il.policy.training import pretrained
+    from er_il.support.atomic_files import write_atomically, write_json
     from er_il.support.counts import tally
     from er_il.support.provenance import provenance
 
     console = Console()
     with make_progress(console) as progress:
         bar = progress.add_task(f"{task}, {decoder}", total=episodes)
-        cell = evaluate(
+        done = evaluate(
             pretrained(policy),
             task,
             decoder,
@@ -49,12 +50,15 @@ def eval(
         )
     folder = out or Path("outputs/eval") / task / decoder
     meta = provenance() | {"policy": str(policy), "first_seed": seed, "episodes": episodes, "on_invalid": on_invalid}
-    write_cells([cell], meta, folder)
-    report = cell.report()
+    rollouts = long_form([({"task": task, "decoder": decoder}, done)])
+    report = summarise(rollouts)
+    write_json(folder / "report.json", {"meta": meta, "cells": [{"task": task, "decoder": decoder} | report]})
+    text = as_csv(rollouts, ["task", "decoder", *COUNTS])
+    write_atomically(folder / "episodes.csv", lambda path: path.write_text(text))
     low, high = report["interval"]
     failures = tally(report["failures"]) or "none"
     console.print(
-        f"Success {cell.successes}/{episodes} (exact 95 % interval {low:.1%} to {high:.1%})\n"
+        f"Success {report['successes']}/{episodes} (exact 95 % interval {low:.1%} to {high:.1%})\n"
         f"Failures: {failures}\n"
         f"Invalid actions: {report['invalid_rate']:.1%}; largest joint step {report['max_joint_step']:.3f} rad; "
         f"decode p50 {report['decode_p50_ms']:.2f} ms, p99 {report['decode_p99_ms']:.2f} ms\n"

@@ -13,7 +13,7 @@ from er_il.kinematics.solver import Status
 from er_il.spaces.layout import Layout
 from er_il.spaces.pose import PoseSpace
 from er_il.spaces.spec import ACTION
-from er_il.support.workers import worker_pool
+from er_il.support.workers import LocalExecutor
 
 Array = NDArray[np.float64]
 
@@ -112,7 +112,7 @@ def _results(layout: Layout, episodes: Sequence[EncodedEpisode], workers: int) -
     if workers <= 1:
         yield from map(functools.partial(decode_episode, layout), episodes)
     else:
-        with worker_pool(workers, _prepare, layout.spec()) as pool:
+        with LocalExecutor(workers, _prepare, layout.spec()) as pool:
             yield from pool.map(_decode, episodes)
 
 

@@ -17,7 +17,7 @@ from er_il.envs.tasks import task_id
 from er_il.support.atomic_files import write_arrays
 from er_il.support.counts import tally
 from er_il.support.errors import DatasetError, PlanError
-from er_il.support.workers import worker_pool
+from er_il.support.workers import LocalExecutor
 
 Floats = NDArray[np.float32]
 
@@ -119,7 +119,7 @@ def collect(recipe: Recipe, folder: Path, workers: int) -> Iterator[tuple[int, s
     """
     seeds, pending = recipe.demo_seeds(), deque()
     kept, dropped = 0, Counter[str]()
-    with worker_pool(workers, _prepare, recipe, folder) as pool:
+    with LocalExecutor(workers, _prepare, recipe, folder) as pool:
         while kept < recipe.episodes:
             while len(pending) < recipe.episodes - kept:
                 seed = next(seeds)

@@ -1,4 +1,4 @@
-"""What a sceptic would try: task space whose null space is pulled to a posture that the demonstrations suggest.
+"""Posture baselines: task space with its null space pulled to one posture of the demonstrations.
 
 A pose leaves the elbow open, and a controller that pulls it to a fixed posture closes the gap. If there
 is one posture that suits a whole task, that is enough, and no redundancy-aware action is needed.
@@ -30,19 +30,21 @@ def grasp_posture(demos: Sequence[Array]) -> Array:
     return np.mean([demo[_last_closing(demo[:, -1]), :-1] for demo in demos], axis=0)
 
 
-SCEPTICS: Mapping[str, Callable[[Sequence[Array]], Array]] = {"task-mean": mean_posture, "task-grasp": grasp_posture}
+POSTURE_BASELINES: Mapping[str, Callable[[Sequence[Array]], Array]] = {
+    "task-mean": mean_posture,
+    "task-grasp": grasp_posture,
+}
 
-
-POSTURE_DECODER = "task-posture"  # what a sceptic's decoder is, but for the posture
+POSTURE_DECODER = "task-posture"  # what a posture baseline is, but for the posture
 
 
 def space_of(decoder_name: str) -> str:
-    """Name of the action space that a decoder, or a sceptic's, reads.
+    """Name of the action space that a decoder, or a posture baseline, reads.
 
     Raises:
         UnknownNameError: no decoder has that name.
     """
-    return decoder(POSTURE_DECODER if decoder_name in SCEPTICS else decoder_name).space
+    return decoder(POSTURE_DECODER if decoder_name in POSTURE_BASELINES else decoder_name).space
 
 
 def _last_closing(opening: Array) -> int:

@@ -1,16 +1,17 @@
 """One rollout of a trained policy, recorded in full: a trace, and a film if wanted."""
 
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 from lerobot.envs.utils import NEW_ROLLOUT_OPTION
 from numpy.typing import NDArray
 
+from er_il.envs.contract import check_policy
 from er_il.evaluation.rollouts import TIMEOUT
 from er_il.evaluation.trace import Trace
-from er_il.policy.actor import Actor, environment_of
+from er_il.policy.actor import Actor, environment_of, one_thread
 from er_il.spaces.action_space import ActionSpace
 
 SUCCESS = "success"
@@ -30,25 +31,22 @@ def record_rollout(
         film_every: Take a picture each so many control steps, and one at the end; 0: none.
     """
     config = environment_of(policy, task, decoder_name)
-    actor = Actor.load(policy, config)
-    env = config.make()
-    world: Any = env.unwrapped
-    pictures: list[Picture] = []
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
     rows: dict[str, list[Any]] = {key: [] for key in ("q", "gripper", "action", "command", "status", "state")}
-    try:
+    pictures: list[Picture] = []
+    with closing(config.make()) as env, one_thread():
+        check_policy(policy, env.space)
+        actor = Actor.load(policy, config)
+        world: Any = env.unwrapped
         observation, info = env.reset(seed=seed, options={NEW_ROLLOUT_OPTION: True})
         actor.reset(seed)
         done = False
         while not done:
             if film_every and len(rows["q"]) % film_every == 0:
                 pictures.append(world.render())
-            batch = _batched(observation)
             rows["q"].append(world.joint_positions)
             rows["gripper"].append(world.gripper_opening)
             rows["state"].append(observation["environment_state"])
-            action = actor.act(batch, world.task_description)[0]
+            action = actor.act(_batched(observation), world.task_description)[0]
             observation, _, terminated, truncated, info = env.step(action)
             rows["action"].append(action)
             rows["command"].append(info["command"])
@@ -71,10 +69,7 @@ def record_rollout(
             environment_state=np.array(rows["state"], dtype=np.float64),
             environment_state_names=world.environment_state_names,
         )
-        return trace, pictures
-    finally:
-        env.close()
-        torch.set_num_threads(threads)
+    return trace, pictures
 
 
 def _batched(observation: dict[str, Any]) -> dict[str, Any]:

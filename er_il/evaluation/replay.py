@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from er_il.arms.arm import Arm
 from er_il.datasets.dataset import INFO, Dataset, datasets_in
@@ -19,12 +20,12 @@ from er_il.datasets.record import DatasetRecord, RecordedEpisode, read_episodes
 from er_il.envs.decoders import DECODERS, decoder
 from er_il.envs.tasks import task_id
 from er_il.envs.wrapper import ActionSpaceEnv, make_action_space_env
-from er_il.evaluation.outcomes import summarise
+from er_il.evaluation.results import summarise
 from er_il.kinematics.rotation import Quaternion
 from er_il.spaces.registry import arm_space_from_spec, name_of
 from er_il.support.atomic_files import write_json
 from er_il.support.errors import DatasetError
-from er_il.support.workers import worker_pool
+from er_il.support.workers import LocalExecutor
 
 # [s] The last action is held that long at most: a grip found a little later than in the demo is a grip all the same.
 GRACE = 1.0
@@ -38,7 +39,7 @@ class Replayed:
     success: bool
     failure: str  # "" after success
     deviation: float  # [rad] largest distance of a joint from where it was in the demo at that step, pushed or not
-    joint_step: float  # [rad] largest joint change that a decoded action asked for
+    max_joint_step: float  # [rad] largest joint change that a decoded action asked for
     statuses: Counter[str]  # of decoding, one a step
 
 
@@ -58,14 +59,26 @@ class ReplayCell:
 
     def report(self) -> dict[str, Any]:
         """Return the cell as JSON."""
-        return summarise(self.task, self.decoder, self.demos) | {
-            "leader": {"starts": len(self.demos) + self.dropped.total(), "dropped": dict(self.dropped.most_common())},
-            "max_joint_deviation": max(demo.deviation for demo in self.demos),
-            "demos": [
-                {"seed": demo.seed, "success": demo.success, "failure": demo.failure, "max_deviation": demo.deviation}
-                for demo in self.demos
-            ],
-        }
+        return (
+            {"task": self.task, "decoder": self.decoder}
+            | summarise(pd.DataFrame(map(vars, self.demos)))
+            | {
+                "leader": {
+                    "starts": len(self.demos) + self.dropped.total(),
+                    "dropped": dict(self.dropped.most_common()),
+                },
+                "max_joint_deviation": max(demo.deviation for demo in self.demos),
+                "demos": [
+                    {
+                        "seed": demo.seed,
+                        "success": demo.success,
+                        "failure": demo.failure,
+                        "max_deviation": demo.deviation,
+                    }
+                    for demo in self.demos
+                ],
+            }
+        )
 
 
 def replay(datasets: Sequence[Path], workers: int, advance: Callable[[Path, str, int, int], None]) -> list[ReplayCell]:
@@ -82,7 +95,7 @@ def replay(datasets: Sequence[Path], workers: int, advance: Callable[[Path, str,
     """
     plays = [(dataset, play, read_episodes(dataset)) for dataset in datasets for play in _plays(dataset)]
     cells = []
-    with worker_pool(workers, _prepare) as pool:
+    with LocalExecutor(workers, _prepare) as pool:
         running = [(path, play, [pool.submit(_replay, play, demo) for demo in demos]) for path, play, demos in plays]
         for path, play, jobs in running:
             done = []

@@ -1,62 +1,120 @@
-"""Results on disk: a report as JSON and one row an episode as CSV, never half-written."""
+"""Rollouts in long form, one row a rollout, and what reports say of them."""
 
-import csv
 import json
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from er_il.evaluation.rollouts import Cell, Episode
-from er_il.support.atomic_files import write_atomically, write_json
+import numpy as np
+import pandas as pd
+
+from er_il.evaluation.rollouts import Rollout
+from er_il.evaluation.statistics import exact_interval, paired_difference
+from er_il.kinematics.solver import Status
+from er_il.support.atomic_files import write_atomically
 
 REFERENCE = "joint"  # the decoder that the others are compared with, rollout by rollout
 RESULTS = "results.json"  # the report of a grid, from which everything is rendered
 EPISODES = "episodes.csv.gz"
 
+CELL = ["task", "decoder", "demonstrations"]
+LABELS = [*CELL, "training_seed"]
+COUNTS = ["seed", "success", "failure", "steps", "invalid", "max_joint_step"]
+COLUMNS = [*LABELS, *COUNTS, "elbow_error"]  # of a CSV; in memory there are statuses and latencies, too
 
-def write_cells(cells: Sequence[Cell], meta: dict[str, Any], folder: Path) -> None:
-    """Write ``report.json`` and one row an episode in ``episodes.csv``."""
-    write_json(folder / "report.json", {"meta": meta, "cells": [cell.report() for cell in cells]})
-    write_atomically(folder / "episodes.csv", lambda path: _write_csv(cells, path))
 
-
-def save_cell(cell: Cell, path: Path, notes: Mapping[str, Any] | None = None) -> None:
-    """Write a cell with all its episodes, for :func:`load_cell`, and notes (JSON) on how it came about."""
-    data = vars(cell) | {"episodes": [vars(episode) for episode in cell.episodes], "notes": notes or {}}
+def save_rollouts(rollouts: Sequence[Rollout], path: Path, notes: Mapping[str, Any]) -> None:
+    """Write rollouts, for :func:`load_rollouts`, and notes (JSON) on how they came about."""
+    data = {"episodes": [vars(rollout) for rollout in rollouts], "notes": notes}
     write_atomically(path, lambda partial: partial.write_text(json.dumps(data)))
 
 
+def load_rollouts(path: Path) -> list[Rollout]:
+    """Read what :func:`save_rollouts` wrote."""
+    return [
+        Rollout(**each | {"statuses": Counter(each["statuses"]), "latencies": tuple(each["latencies"])})
+        for each in json.loads(path.read_text())["episodes"]
+    ]
+
+
 def load_notes(path: Path) -> dict[str, Any]:
-    """Read the notes of a cell that :func:`save_cell` wrote."""
+    """Read the notes that :func:`save_rollouts` wrote."""
     return json.loads(path.read_text())["notes"]
 
 
-def load_cell(path: Path) -> Cell:
-    """Read what :func:`save_cell` wrote."""
-    data = json.loads(path.read_text())
-    episodes = [
-        Episode(**episode | {"statuses": Counter(episode["statuses"]), "latencies": tuple(episode["latencies"])})
-        for episode in data["episodes"]
+def long_form(groups: Iterable[tuple[Mapping[str, object], Iterable[Rollout]]]) -> pd.DataFrame:
+    """Return one row a rollout: :data:`COLUMNS`, ``statuses`` and ``latencies``.
+
+    Args:
+        groups: Values of :data:`LABELS`, and the rollouts that they hold for.
+    """
+    rows = [
+        {**labels, **vars(each), "steps": each.steps, "invalid": each.invalid, "max_joint_step": each.joint_step}
+        for labels, rollouts in groups
+        for each in rollouts
     ]
-    return Cell(data["task"], data["decoder"], tuple(episodes))
+    columns = pd.Index([*COLUMNS, "statuses", "latencies"])
+    return pd.DataFrame(rows, columns=columns).astype({"elbow_error": float})
 
 
-def _write_csv(cells: Sequence[Cell], path: Path) -> None:
-    with path.open("w", newline="") as file:
-        rows = csv.writer(file)
-        rows.writerow(["task", "decoder", "seed", "success", "failure", "steps", "invalid", "max_joint_step"])
-        for cell in cells:
-            for e in cell.episodes:
-                rows.writerow(
-                    [
-                        cell.task,
-                        cell.decoder,
-                        e.seed,
-                        int(e.success),
-                        e.failure,
-                        e.steps,
-                        e.invalid,
-                        f"{e.joint_step:.6f}",
-                    ]
-                )
+def as_csv(rollouts: pd.DataFrame, columns: Sequence[str] = COLUMNS) -> str:
+    """Return the rollouts as CSV, a row each."""
+    shown = rollouts.astype({"success": int})
+    return shown.to_csv(columns=list(columns), index=False, float_format="%.6f", lineterminator="\n")
+
+
+def summarise(rollouts: pd.DataFrame) -> dict[str, Any]:
+    """Return what a report says of rollouts, or replays, of one task through one decoder, as JSON.
+
+    Args:
+        rollouts: Columns ``success``, ``failure``, ``statuses`` and ``max_joint_step``; of rollouts also
+            ``latencies``, ``steps`` and ``elbow_error``.
+    """
+    count, successes = len(rollouts), int(rollouts["success"].sum())
+    statuses = sum(rollouts["statuses"], Counter[str]())
+    report = {
+        "successes": successes,
+        "episodes": count,
+        "interval": list(exact_interval(successes, count)),
+        "failures": dict(Counter(rollouts.loc[~rollouts["success"], "failure"]).most_common()),
+        "statuses": dict(statuses.most_common()),
+        "invalid_rate": 1 - statuses[Status.OK] / statuses.total(),
+        "max_joint_step": float(rollouts["max_joint_step"].max()),
+    }
+    if "latencies" in rollouts:
+        p50, p99 = 1e3 * np.percentile(np.concatenate(list(rollouts["latencies"])), [50, 99])
+        report |= {"decode_p50_ms": float(p50), "decode_p99_ms": float(p99)}
+        report["mean_steps"] = float(rollouts["steps"].mean())
+        if measured := rollouts["elbow_error"].dropna().tolist():
+            report["elbow_error"] = float(np.mean(measured))
+    return report
+
+
+def report_cells(rollouts: pd.DataFrame) -> list[dict[str, Any]]:
+    """Return each cell as JSON: the rollouts of all training seeds together, then seed by seed.
+
+    Where :data:`REFERENCE` met the same initial states with policies of the same training seeds, the paired
+    difference to it stands beside.
+    """
+    reference = rollouts.loc[rollouts["decoder"] == REFERENCE, [*LABELS, "seed", "success"]]
+    cells = []
+    for key, cell in rollouts.groupby(CELL, sort=False):
+        task, decoder, demonstrations = _labels(key)
+        report = {"task": task, "decoder": decoder} | summarise(cell) | {"demonstrations": int(demonstrations)}
+        per_seed = {seed: summarise(part) for seed, part in cell.groupby("training_seed", sort=False)}
+        report["per_seed"] = [
+            {"training_seed": int(str(seed))} | {name: each[name] for name in ("successes", "episodes", "interval")}
+            for seed, each in per_seed.items()
+        ]
+        paired = cell.merge(reference, on=["task", "demonstrations", "training_seed", "seed"], suffixes=("", "_theirs"))
+        if decoder != REFERENCE and len(paired):
+            difference, low, high = paired_difference(paired["success"].tolist(), paired["success_theirs"].tolist())
+            report[f"difference_to_{REFERENCE}"] = {"difference": difference, "interval": [low, high]}
+        cells.append(report)
+    return cells
+
+
+def _labels(key: Hashable) -> tuple[Any, ...]:
+    assert isinstance(key, tuple)
+    return key

@@ -1,21 +1,20 @@
-"""Rollouts of a trained policy through a decoder, batched, and what they amount to."""
+"""Rollouts of a trained policy through a decoder, batched."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import torch
 from gymnasium.vector import SyncVectorEnv
 from lerobot.envs.utils import NEW_ROLLOUT_OPTION
 
 from er_il.control.commander import BEST_EFFORT
+from er_il.envs.contract import check_policy
 from er_il.evaluation.elbow import ElbowReference
-from er_il.evaluation.outcomes import summarise
 from er_il.kinematics.solver import Status
-from er_il.policy.actor import POLICY_ROWS, Actor, environment_of
+from er_il.policy.actor import POLICY_ROWS, Actor, environment_of, one_thread
 from er_il.support.errors import ErIlError
 
 FIRST_SEED = 1000  # LeRobot's own; demonstrations use seeds from a million up
@@ -23,7 +22,7 @@ TIMEOUT = "timeout"
 
 
 @dataclass(frozen=True)
-class Episode:
+class Rollout:
     """One rollout."""
 
     seed: int
@@ -45,37 +44,6 @@ class Episode:
         return self.steps - self.statuses[Status.OK]
 
 
-@dataclass(frozen=True)
-class Cell:
-    """All episodes of one task and decoder."""
-
-    task: str
-    decoder: str
-    episodes: tuple[Episode, ...]
-
-    @classmethod
-    def joined(cls, parts: Sequence["Cell"]) -> "Cell":
-        """Return all episodes of parts of the same cell."""
-        return cls(parts[0].task, parts[0].decoder, tuple(episode for part in parts for episode in part.episodes))
-
-    @property
-    def successes(self) -> int:
-        """Number of successful episodes."""
-        return sum(episode.success for episode in self.episodes)
-
-    def report(self) -> dict[str, Any]:
-        """Return the cell as JSON."""
-        latencies = np.concatenate([episode.latencies for episode in self.episodes])
-        elbow_errors = [episode.elbow_error for episode in self.episodes if episode.elbow_error is not None]
-        measured = {"elbow_error": float(np.mean(elbow_errors))} if elbow_errors else {}
-        return summarise(self.task, self.decoder, self.episodes) | {
-            "decode_p50_ms": 1e3 * float(np.percentile(latencies, 50)),
-            "decode_p99_ms": 1e3 * float(np.percentile(latencies, 99)),
-            "mean_steps": len(latencies) / len(self.episodes),
-            **measured,
-        }
-
-
 def evaluate(
     policy: Path,
     task: str,
@@ -88,13 +56,13 @@ def evaluate(
     elbow: ElbowReference | None = None,
     batch_size: int = POLICY_ROWS,
     advance: Callable[[int], None] = lambda episodes: None,
-) -> Cell:
+) -> list[Rollout]:
     """Roll a policy out on the seeds ``seed, seed + 1, ...``.
 
     Args:
         policy: Folder of the pretrained policy.
         task: Name of the task.
-        decoder_name: ``joint``, ``task-nearest``, ``task-posture``, ``erj``.
+        decoder_name: ``joint``, ``task-nearest``, ``task-posture``, ``erj``, ``era``, ``erj@JOINT``.
         episodes: Number of rollouts.
         seed: Seed of the first one; the same seed is the same initial state for every decoder.
         on_invalid: See :class:`er_il.control.commander.Commander`.
@@ -102,7 +70,7 @@ def evaluate(
         elbow: What to measure the elbow against, if anything.
         batch_size: Environments side by side, up to ``POLICY_ROWS``; it changes no result, unless the policy
             draws random numbers, as Diffusion does.
-        advance: Called with the number of episodes just finished.
+        advance: Called with the number of rollouts just finished.
 
     Raises:
         PolicyError: the policy is missing, or was trained for another action space or other cameras.
@@ -114,25 +82,21 @@ def evaluate(
     if not 1 <= batch_size <= POLICY_ROWS:
         raise ErIlError(f"The batch size is {batch_size}; it must be between 1 and {POLICY_ROWS}.")
     config = environment_of(policy, task, decoder_name, on_invalid, posture)
-    actor = Actor.load(policy, config)
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)  # rounding depends on the number of threads, too
     vector = config.create_envs(min(batch_size, episodes))[config.type][0]
     assert isinstance(vector, SyncVectorEnv)
-    try:
-        done: list[Episode] = []
+    with closing(vector), one_thread():
+        check_policy(policy, vector.get_attr("space")[0])
+        actor = Actor.load(policy, config)
+        done: list[Rollout] = []
         while len(done) < episodes:
             seeds = list(range(seed + len(done), seed + min(len(done) + vector.num_envs, episodes)))
-            done += _rollout(vector, actor, seeds, elbow)
+            done += _roll_out(vector, actor, seeds, elbow)
             advance(len(seeds))
-    finally:
-        vector.close()
-        torch.set_num_threads(threads)
-    return Cell(task, decoder_name, tuple(done))
+    return done
 
 
-def _rollout(vector: SyncVectorEnv, actor: Actor, seeds: list[int], elbow: ElbowReference | None) -> list[Episode]:
-    """Run one episode a seed, side by side, until the last has ended."""
+def _roll_out(vector: SyncVectorEnv, actor: Actor, seeds: list[int], elbow: ElbowReference | None) -> list[Rollout]:
+    """Run one rollout a seed, side by side, until the last has ended."""
     n = vector.num_envs
     # An environment without a seed of its own repeats the last: its outcome is dropped.
     all_seeds: list[int | None] = [*seeds, *seeds[-1:] * (n - len(seeds))]
@@ -152,7 +116,7 @@ def _rollout(vector: SyncVectorEnv, actor: Actor, seeds: list[int], elbow: Elbow
         done |= terminated | truncated
     tallies = vector.get_attr("tally")
     return [
-        Episode(
+        Rollout(
             seed=seed,
             success=bool(success[i]),
             failure=failure[i],

@@ -6,10 +6,10 @@ from concurrent.futures import Future
 from typing import Any
 
 from er_il.support.errors import ErIlError
+from er_il.support.workers import ONE_THREAD
 
 PATIENCE = 10.0  # [s] for the cluster to answer
 RETRIES = 3  # of a job whose process or machine died under it
-_ONE_THREAD = {"env_vars": {"OMP_NUM_THREADS": "1"}}
 
 
 class RayExecutor:
@@ -33,7 +33,7 @@ class RayExecutor:
         try:
             if host and port.isdigit():  # Ray itself would try for minutes
                 socket.create_connection((host.removeprefix("ray://"), int(port)), timeout=PATIENCE).close()
-            self._ray.init(self._address, runtime_env=_ONE_THREAD, log_to_driver=False)
+            self._ray.init(self._address, runtime_env={"env_vars": ONE_THREAD}, log_to_driver=False)
         except (OSError, OverflowError, ValueError) as error:
             raise ErIlError(f"No Ray cluster at {self._address}: {error}") from error
         return self

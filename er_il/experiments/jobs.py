@@ -1,75 +1,101 @@
-"""Training a policy and rolling it out, as jobs that resume and leave files."""
+"""The jobs of an experiment: recording demonstrations, training policies, rolling out, filming; each leaves files."""
 
 import json
 import os
 import re
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from rich.progress import Progress
 
 from er_il.datasets.record import read_episodes
+from er_il.datasets.recording import generate
 from er_il.envs.contract import dataset_info
 from er_il.evaluation.elbow import ElbowReference
-from er_il.evaluation.posture_baselines import POSTURE_DECODER, SCEPTICS
-from er_il.evaluation.results import save_cell
-from er_il.evaluation.rollouts import FIRST_SEED, evaluate
+from er_il.evaluation.posture_baselines import POSTURE_BASELINES, POSTURE_DECODER
+from er_il.evaluation.recording import record_rollout
+from er_il.evaluation.results import save_rollouts
+from er_il.evaluation.rollouts import evaluate
+from er_il.experiments.grid import Grid
 from er_il.experiments.schedule import FileResult, Job
-from er_il.policy.actor import POLICY_ROWS
-from er_il.policy.configuration import default_config, default_steps
+from er_il.policy.configuration import default_config
 from er_il.policy.training import PRECISION, Training, train_episodes
-from er_il.spaces.action_space import from_spec
+from er_il.report.pictures import write_film
+from er_il.spaces.registry import arm_space_from_spec
 from er_il.spaces.spec import action_spec
 from er_il.support.atomic_files import write_json
 from er_il.support.cost import Cost, measured
 from er_il.support.errors import ErIlError
 from er_il.support.provenance import git_sha
 
+FILM_EVERY = 2  # control steps a picture: shadows make each expensive
 _LOGGED_STEP = re.compile(r"step:([\d.]+)(K?)")  # as lerobot-train logs it
 
 
 @dataclass(frozen=True)
-class Train:
+class Demonstrate:
+    """Record the demonstrations of a grid's task, once, and encode them in each space."""
+
+    task: str
+    grid: Grid = field(hash=False)
+    spaces: tuple[str, ...]
+    out: Path  # folder of the datasets, one a space
+    workers: int  # processes that record
+
+    stage = "Record"
+    progress = 0
+    needs = ()
+
+    @property
+    def name(self) -> str:
+        return f"demonstrate {self.task}"
+
+    @property
+    def size(self) -> int:
+        return self.grid.recipe(self.task).episodes
+
+    @property
+    def log(self) -> Path:
+        return self.out.with_name(f"{self.out.name}.log")
+
+    @property
+    def done(self) -> bool:
+        return all((self.out / space).exists() for space in self.spaces)
+
+    def run(self) -> None:
+        """Record and encode what is missing."""
+        with Progress(disable=True) as progress:
+            generate(self.grid.recipe(self.task), self.spaces, self.out, progress, self.workers)
+
+
+@dataclass(frozen=True)
+class Train(FileResult):
     """Train the policy of a space with LeRobot's own command."""
 
     task: str
     space: str
     dataset: Path
-    out: Path  # of the training; its log and its notes lie beside it
+    path: Path  # of the notes on the policy: its cost and origin; there once it is trained
     steps: int
     seed: int
-    demonstrations: int | None = None  # the first ones of the training episodes; all if None
+    demonstrations: int  # the first ones of the training episodes
     configuration: str = ""  # kind of the shipped one, such as images_small; from states if empty
     needs: tuple[Job, ...] = ()
 
+    stage = "Train"
+
     @property
     def name(self) -> str:
-        """What it does, for people."""
-        count = "" if self.demonstrations is None else f" on {self.demonstrations} demonstrations"
-        return f"train {self.task} {self.space}{count}, seed {self.seed}"
+        return f"train {self.task} {self.space} on {self.demonstrations} demonstrations, seed {self.seed}"
 
     @property
-    def log(self) -> Path:
-        """What lerobot-train printed."""
-        return self.out.with_name(f"{self.out.name}.log")
-
-    @property
-    def notes(self) -> Path:
-        """Cost and origin of the policy; there once it is trained."""
-        return self.out.with_name(f"{self.out.name}.json")
-
-    @property
-    def done(self) -> bool:
-        """Whether the policy is trained."""
-        return self.notes.exists()
-
-    def read_notes(self) -> dict[str, Any]:
-        """Cost and origin of the trained policy."""
-        return json.loads(self.notes.read_text())
+    def out(self) -> Path:
+        """Folder of the training, beside its notes and its log."""
+        return self.path.with_suffix("")
 
     @property
     def training(self) -> Training:
@@ -80,8 +106,11 @@ class Train:
         )
 
     @property
-    def logged_steps(self) -> int:
-        """Number of steps that the running training has reported."""
+    def size(self) -> int:
+        return self.steps
+
+    @property
+    def progress(self) -> int:
         try:
             steps = _LOGGED_STEP.findall(self.log.read_text())
         except OSError:
@@ -102,7 +131,11 @@ class Train:
                     code = training.run(file)
                 if code:
                     raise ErIlError(f"lerobot-train ended with exit code {code}.")
-        write_json(self.notes, _notes(cost) | {"mixed_precision": os.environ.get(PRECISION, "no")})
+        write_json(self.path, _notes(cost) | {"mixed_precision": os.environ.get(PRECISION, "no")})
+
+    def read_notes(self) -> dict[str, Any]:
+        """Cost and origin of the trained policy."""
+        return json.loads(self.path.read_text())
 
 
 @dataclass(frozen=True)
@@ -110,72 +143,98 @@ class RollOut(FileResult):
     """Roll a trained policy out through a decoder, on some of the initial states."""
 
     trained: Train
-    decoder: str  # a decoder, or one of SCEPTICS
+    decoder: str  # a decoder, or a posture baseline
     first_seed: int
     count: int
     path: Path  # of the result
 
+    stage = "Roll out"
+
     @property
     def name(self) -> str:
-        """What it does, for people."""
         last = self.first_seed + self.count - 1
         return f"roll out {self.decoder} from {self.first_seed} to {last} ({self.trained.name})"
 
     @property
+    def size(self) -> int:
+        return self.count
+
+    @property
     def needs(self) -> tuple[Job, ...]:
-        """The trained policy."""
         return (self.trained,)
 
     def run(self) -> None:
-        """Roll out and write the cell, with what it cost."""
-        demos = _demos(self.trained.dataset, self.trained.demonstrations)
-        sceptic = SCEPTICS.get(self.decoder)
+        """Roll out and write the rollouts, with what they cost."""
+        leader, elbow = _demonstrated(self.trained.dataset, self.trained.demonstrations)
+        posture = POSTURE_BASELINES.get(self.decoder)
         with measured() as cost:
-            cell = evaluate(
+            rollouts = evaluate(
                 self.trained.training.policy,
                 self.trained.task,
-                POSTURE_DECODER if sceptic else self.decoder,
+                POSTURE_DECODER if posture else self.decoder,
                 episodes=self.count,
                 seed=self.first_seed,
-                posture=sceptic(demos.leader).tolist() if sceptic else (),
-                elbow=demos.elbow,
+                posture=posture(leader).tolist() if posture else (),
+                elbow=elbow,
             )
-        save_cell(replace(cell, decoder=self.decoder), self.path, _notes(cost))
-
-
-def roll_outs(trained: Train, decoder_name: str, rollouts: int, folder: Path) -> list[RollOut]:
-    """Divide the rollouts of a decoder into jobs, whose results go into a folder."""
-    starts = range(FIRST_SEED, FIRST_SEED + rollouts, POLICY_ROWS)
-    counts = [min(POLICY_ROWS, FIRST_SEED + rollouts - start) for start in starts]
-    return [
-        RollOut(trained, decoder_name, start, count, folder / f"{start}-{start + count - 1}.json")
-        for start, count in zip(starts, counts, strict=True)
-    ]
+        save_rollouts(rollouts, self.path, _notes(cost))
 
 
 @dataclass(frozen=True)
-class _Demos:
-    """What a policy was trained on."""
+class Film(FileResult):
+    """Record one rollout of a trained policy: as a film (.mp4), a Rerun recording (.rrd) and a trace (.npz)."""
 
-    leader: Sequence[NDArray[np.float64]]  # (T, n + 1) [rad], and the gripper's opening
-    elbow: ElbowReference | None
+    trained: Train
+    decoder: str
+    seed: int  # of the initial state
+    path: Path  # of the trace, written last
+
+    stage = "Film"
+
+    @property
+    def name(self) -> str:
+        return f"film {self.trained.task} through {self.decoder} from {self.seed}"
+
+    @property
+    def needs(self) -> tuple[Job, ...]:
+        return (self.trained,)
+
+    @property
+    def film(self) -> Path:
+        """The film."""
+        return self.path.with_suffix(".mp4")
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """All that it makes."""
+        return self.film, self.path.with_suffix(".rrd"), self.path
+
+    def run(self) -> None:
+        """Roll out, film and record.
+
+        Raises:
+            RenderError: the machine cannot render.
+        """
+        from er_il.viewer import save_rollout
+
+        policy = self.trained.training.policy
+        trace, pictures = record_rollout(policy, self.trained.task, self.decoder, self.seed, FILM_EVERY)
+        write_film(pictures, self.film, round(1 / trace.period / FILM_EVERY))
+        save_rollout(trace, self.path.with_suffix(".rrd"))
+        trace.save(self.path)
 
 
 @lru_cache(maxsize=4)  # jobs of one policy follow one another
-def _demos(dataset: Path, count: int | None) -> _Demos:
+def _demonstrated(dataset: Path, count: int) -> tuple[list[NDArray[np.float64]], ElbowReference | None]:
+    """The leader's paths (T, n + 1) [rad and opening] that a policy was trained on, and where the elbow was."""
     info = dataset_info(dataset)
-    arm = from_spec(action_spec(info["features"])).arm
+    arm = arm_space_from_spec(action_spec(info["features"])).arm
     episodes = read_episodes(dataset)
     chosen = [episodes[i] for i in train_episodes(info)[:count]]
     followed = [demo.state[:, : arm.dof].astype(np.float64) for demo in chosen]
     leader = [demo.leader.astype(np.float64) for demo in chosen]
-    return _Demos(leader, ElbowReference.of_demos(arm, 1 / info["fps"], followed))
+    return leader, ElbowReference.of_demos(arm, 1 / info["fps"], followed)
 
 
 def _notes(cost: Cost) -> dict[str, Any]:
     return {"cost": asdict(cost), "git": git_sha()}
-
-
-def steps_of(space: str, steps: int | None, configuration: str = "") -> int:
-    """Number of training steps: those asked for, or as many as the space's configuration says."""
-    return default_steps(default_config(space, configuration)) if steps is None else steps

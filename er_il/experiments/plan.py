@@ -1,61 +1,32 @@
-"""From a grid to jobs: which files a benchmark consists of, each named by all that decides what is in it.
+"""From a grid to jobs: which files an experiment consists of, each named by all that decides what is in it.
 
 So a grid may grow by tasks, decoders, seeds or demonstrations without anything being done again.
 """
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
+from itertools import chain, product
 from pathlib import Path
 
+import pandas as pd
 import yaml
-from rich.progress import Progress
 
 from er_il.datasets.record import DatasetRecord
-from er_il.datasets.recording import generate
 from er_il.evaluation.posture_baselines import space_of
-from er_il.evaluation.results import load_cell
-from er_il.evaluation.rollouts import Cell
-from er_il.experiments.grid import Entry, Grid
-from er_il.experiments.jobs import RollOut, Train, roll_outs, steps_of
-from er_il.policy.configuration import default_config
-from er_il.support.atomic_files import write_atomically
+from er_il.evaluation.results import load_rollouts, long_form
+from er_il.evaluation.rollouts import FIRST_SEED
+from er_il.experiments.grid import Cell, Grid
+from er_il.experiments.jobs import Demonstrate, RollOut, Train
+from er_il.policy.actor import POLICY_ROWS
+from er_il.policy.configuration import default_config, default_steps
+from er_il.support.atomic_files import write_json
 from er_il.support.errors import ErIlError
+from er_il.support.folder_lock import LOCK, folder_lock
 
 OWNER = "benchmark.json"
-
-
-@dataclass(frozen=True)
-class Demonstrate:
-    """Record the demonstrations of a grid's task, once, and encode them in each space."""
-
-    task: str
-    grid: Grid
-    spaces: tuple[str, ...]
-    out: Path  # folder of the datasets, one a space
-
-    needs = ()
-
-    @property
-    def name(self) -> str:
-        """What it does, for people."""
-        return f"demonstrate {self.task}"
-
-    @property
-    def log(self) -> Path:
-        """What went wrong, if something did."""
-        return self.out.with_name(f"{self.out.name}.log")
-
-    @property
-    def done(self) -> bool:
-        """Whether every dataset is there."""
-        return all((self.out / space).exists() for space in self.spaces)
-
-    def run(self) -> None:
-        """Record and encode what is missing."""
-        with Progress(disable=True) as progress:
-            generate(self.grid.recipe(self.task), self.spaces, self.out, progress, workers=1)
 
 
 @dataclass(frozen=True)
@@ -64,14 +35,25 @@ class Plan:
 
     grid: Grid
     out: Path
+    recorders: int = 1  # processes that record a task's demonstrations
 
-    def claim(self) -> None:
-        """Make the folder this grid's own.
+    @contextmanager
+    def claimed(self) -> Iterator[None]:
+        """Make the folder this grid's own, and work in it alone.
 
         Raises:
-            ErIlError: it holds something else, demonstrations of another recipe than today's, or policies
-                trained by another configuration.
+            ErIlError: another command works in it, or it holds something else, demonstrations of another recipe
+                than today's, or policies trained by another configuration.
         """
+        self.out.mkdir(parents=True, exist_ok=True)
+        found = {path.name for path in self.out.iterdir()}
+        if found - {LOCK} and OWNER not in found:  # left as it is, without a lock
+            raise ErIlError(f"{self.out} holds something else than an experiment; choose another --out.")
+        with folder_lock(self.out):
+            self._claim()
+            yield
+
+    def _claim(self) -> None:
         for task, demonstrate in self._demonstrations.items():
             for dataset in (demonstrate.out / space for space in demonstrate.spaces):
                 if dataset.exists() and (
@@ -82,10 +64,8 @@ class Plan:
                         f"Choose another --out, or delete what {self.out} holds of {task}."
                     )
         owner = self.out / OWNER
-        names = {space_of(entry.decoder) for entry in self.grid.entries}
-        mine = {
-            name: yaml.safe_load(default_config(name, self.grid.configuration).read_text()) for name in sorted(names)
-        }
+        spaces = sorted({space_of(cell.decoder) for cell in self.grid.cells})
+        mine = {name: yaml.safe_load(default_config(name, self.grid.configuration).read_text()) for name in spaces}
         theirs = {}
         if owner.exists():
             found = json.loads(owner.read_text())
@@ -97,62 +77,68 @@ class Plan:
                     f"{self.out} holds policies trained by other configurations than today's, of "
                     f"{', '.join(changed)}; choose another --out, or delete it."
                 )
-        elif self.out.exists() and any(self.out.iterdir()):
-            raise ErIlError(f"{self.out} holds something else than a benchmark; choose another --out.")
-        self.out.mkdir(parents=True, exist_ok=True)
-        claim = json.dumps({"title": self.grid.title, "configurations": theirs | mine}, indent=2)
-        write_atomically(owner, lambda path: path.write_text(claim))
+        write_json(owner, {"title": self.grid.title, "configurations": theirs | mine})
 
     @cached_property
     def _demonstrations(self) -> dict[str, Demonstrate]:
-        spaces = tuple(dict.fromkeys(space_of(entry.decoder) for entry in self.grid.entries))
+        spaces = tuple(dict.fromkeys(space_of(cell.decoder) for cell in self.grid.cells))
         folder = self.out / "datasets"
-        return {task: Demonstrate(task, self.grid, spaces, folder / task) for task in self.grid.tasks}
+        return {task: Demonstrate(task, self.grid, spaces, folder / task, self.recorders) for task in self.grid.tasks}
 
-    def training(self, entry: Entry, seed: int) -> Train:
-        """The training of an entry's policy."""
-        space = space_of(entry.decoder)
-        demonstrate = self._demonstrations[entry.task]
-        steps = steps_of(space, self.grid.steps, self.grid.configuration)
+    def training(self, cell: Cell, seed: int) -> Train:
+        """The training of a cell's policy."""
+        space, grid = space_of(cell.decoder), self.grid
+        demonstrate = self._demonstrations[cell.task]
+        steps = default_steps(default_config(space, grid.configuration)) if grid.steps is None else grid.steps
         return Train(
-            task=entry.task,
+            task=cell.task,
             space=space,
             dataset=demonstrate.out / space,
-            out=self.out / "policies" / entry.task / space / _variant(entry, seed, steps),
+            path=self.out / "policies" / cell.task / space / f"{_variant(cell, steps, seed)}.json",
             steps=steps,
             seed=seed,
-            demonstrations=entry.demonstrations,
-            configuration=self.grid.configuration,
+            demonstrations=cell.demonstrations,
+            configuration=grid.configuration,
             needs=(demonstrate,),
         )
 
-    def rolling_out(self, entry: Entry, seed: int) -> list[RollOut]:
-        """The rollouts of an entry's policy with one training seed."""
-        trained = self.training(entry, seed)
-        folder = self.out / "rollouts" / entry.task / entry.decoder / _variant(entry, seed, trained.steps)
-        return roll_outs(trained, entry.decoder, self.grid.rollouts, folder)
+    def _rolling_out(self, cell: Cell, seed: int) -> list[RollOut]:
+        trained = self.training(cell, seed)
+        folder = self.out / "rollouts" / cell.task / cell.decoder / _variant(cell, trained.steps, seed)
+        end = FIRST_SEED + self.grid.rollouts
+        jobs = []
+        for start in range(FIRST_SEED, end, POLICY_ROWS):
+            count = min(POLICY_ROWS, end - start)
+            jobs.append(RollOut(trained, cell.decoder, start, count, folder / f"{start}-{start + count - 1}.json"))
+        return jobs
 
     @cached_property
-    def targets(self) -> dict[Entry, dict[int, list[RollOut]]]:
-        """The rollouts of each entry and training seed."""
+    def targets(self) -> dict[Cell, dict[int, list[RollOut]]]:
+        """The rollouts of each cell and training seed."""
         return {
-            entry: {seed: self.rolling_out(entry, seed) for seed in self.grid.seeds_of(entry)}
-            for entry in self.grid.entries
+            cell: {seed: self._rolling_out(cell, seed) for seed in self.grid.seeds_of(cell)} for cell in self.grid.cells
         }
 
     @property
     def jobs(self) -> list[RollOut]:
-        """All rollouts, the first training seed of every entry first: an early look at the whole table."""
-        pairs = product(self.grid.training_seeds, self.grid.entries)
-        return [job for seed, entry in pairs for job in self.targets[entry].get(seed, ())]
+        """All rollouts, the first training seed of every cell first: an early look at the whole table."""
+        pairs = product(self.grid.training_seeds, self.grid.cells)
+        return [job for seed, cell in pairs for job in self.targets[cell].get(seed, ())]
 
-    def results(self, entry: Entry) -> dict[int, Cell] | None:
-        """The rollouts of an entry by training seed; None as long as one is missing."""
-        parts = self.targets[entry]
-        if not all(job.done for jobs in parts.values() for job in jobs):
-            return None
-        return {seed: Cell.joined([load_cell(job.path) for job in jobs]) for seed, jobs in parts.items()}
+    @property
+    def complete(self) -> list[Cell]:
+        """The cells whose rollouts are all done."""
+        return [cell for cell, seeds in self.targets.items() if all(job.done for job in chain(*seeds.values()))]
+
+    def rollouts(self, *cells: Cell) -> pd.DataFrame:
+        """The rollouts of complete cells in long form (:func:`er_il.evaluation.results.long_form`)."""
+        return long_form(
+            (vars(cell) | {"training_seed": seed}, load_rollouts(job.path))
+            for cell in cells
+            for seed, jobs in self.targets[cell].items()
+            for job in jobs
+        )
 
 
-def _variant(entry: Entry, seed: int, steps: int) -> str:
-    return f"{entry.demonstrations}-demonstrations-{steps}-steps-seed-{seed}"
+def _variant(cell: Cell, steps: int, seed: int) -> str:
+    return f"{cell.demonstrations}-demonstrations-{steps}-steps-seed-{seed}"

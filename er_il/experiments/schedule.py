@@ -1,10 +1,10 @@
-"""Jobs that need one another's results: which may run now, what became of the others.
+"""Jobs that need one another's results, run in order on an executor.
 
 A job's result is a file. What is there is not made again, so an interrupted schedule goes on where it was.
 """
 
-import time
 import traceback
+from collections import Counter
 from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
 from pathlib import Path
@@ -25,6 +25,21 @@ class Job(Protocol):
         ...
 
     @property
+    def stage(self) -> str:
+        """Kind of its work, such as "Train"; the jobs of a stage share a progress bar."""
+        ...
+
+    @property
+    def size(self) -> int:
+        """Amount of its work in units of its stage, such as training steps."""
+        ...
+
+    @property
+    def progress(self) -> int:
+        """How much of it is done so far, while it runs."""
+        ...
+
+    @property
     def needs(self) -> "tuple[Job, ...]":
         """Jobs whose results it reads."""
         ...
@@ -36,7 +51,7 @@ class Job(Protocol):
 
     @property
     def done(self) -> bool:
-        """Whether its result is there."""
+        """True if its result is there."""
         ...
 
     def run(self) -> None:
@@ -45,18 +60,18 @@ class Job(Protocol):
 
 
 class FileResult:
-    """What jobs share whose result is one file."""
+    """Common part of jobs whose result is one file."""
 
+    size = 1
+    progress = 0
     path: Path  # of the result
 
     @property
     def log(self) -> Path:
-        """What went wrong, if something did."""
         return self.path.with_suffix(".log")
 
     @property
     def done(self) -> bool:
-        """Whether the result is there."""
         return self.path.exists()
 
 
@@ -74,36 +89,26 @@ class Executor(Protocol):
 
 
 class Schedule:
-    """The jobs that targets need, as far as their results are not there yet.
-
-    A worker that comes free takes a target, so that results come early. Only when no more jobs are left
-    that others wait for than there are workers, these come first: then targets fill up the end, and no
-    worker idles beside the last long job.
-    """
+    """Targets and the jobs that they need, as far as their results are not there yet: a job after its needs."""
 
     def __init__(self, targets: Iterable[Job]) -> None:
-        self.targets = tuple(dict.fromkeys(targets))
-        self.waiting: list[Job] = []
-        self.running: dict[Job, float] = {}  # to the time when it started [s], of time.monotonic
+        self.jobs: dict[Job, None] = {}  # in the order in which they start, as far as needs and workers allow
+        self.running: set[Job] = set()
         self.done: set[Job] = set()
         self.failed: dict[Job, str] = {}
-        self._deaths: dict[Job, int] = {}
-        self._seen: set[Job] = set()
-        self._needed: set[Job] = set()  # by other jobs
-        for target in self.targets:
+        self._deaths: Counter[Job] = Counter()
+        for target in targets:
             self._add(target)
 
     def _add(self, job: Job) -> None:
-        if job in self._seen:
+        if job in self.jobs:
             return
-        self._seen.add(job)
         if job.done:
             self.done.add(job)
-            return
-        for need in job.needs:
-            self._needed.add(need)
-            self._add(need)
-        self.waiting.append(job)
+        else:
+            for need in job.needs:
+                self._add(need)
+        self.jobs[job] = None
 
     def run(self, executor: Executor, watch: Callable[[], None] = lambda: None) -> None:
         """Run all jobs; one that fails, fails alone.
@@ -114,9 +119,8 @@ class Schedule:
         """
         futures: dict[Future[str], Job] = {}
         while True:
-            while len(futures) < executor.workers and (job := self._next(executor.workers)):
-                self.waiting.remove(job)
-                self.running[job] = time.monotonic()
+            while len(futures) < executor.workers and (job := self._next()):
+                self.running.add(job)
                 futures[executor.submit(perform, job)] = job
             watch()
             if not futures:
@@ -124,25 +128,18 @@ class Schedule:
             for future in wait(futures, timeout=POLL, return_when=FIRST_COMPLETED).done:
                 self._finish(futures.pop(future), future)
 
-    @property
-    def skipped(self) -> list[Job]:
-        """Targets that miss the result of a job that failed."""
-        return [job for job in self.targets if job in self.waiting]
-
-    def _next(self, workers: int) -> Job | None:
-        ready = [job for job in self.waiting if all(need in self.done for need in job.needs)]
-        awaited = [job for job in self.waiting if job in self._needed]
-        first = len(awaited) <= workers
-        return min(ready, key=lambda job: (job in self._needed) != first, default=None)
+    def _next(self) -> Job | None:
+        """The first job that may start."""
+        begun = self.done | self.running | self.failed.keys()
+        return next((job for job in self.jobs if job not in begun and self.done.issuperset(job.needs)), None)
 
     def _finish(self, job: Job, future: "Future[str]") -> None:
-        del self.running[job]
+        self.running.remove(job)
         try:
             message = future.result()
         except BrokenExecutor as error:
-            self._deaths[job] = self._deaths.get(job, 0) + 1
+            self._deaths[job] += 1
             if self._deaths[job] < ATTEMPTS:
-                self.waiting.insert(0, job)
                 return
             message = f"its worker died {ATTEMPTS} times ({error})"
         except Exception as error:  # the executor gave it up

@@ -1,8 +1,8 @@
 """A trained policy with its processors, and the environment it was trained for."""
 
 import io
-from collections.abc import Callable, Sequence
-from contextlib import redirect_stdout
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,9 +13,10 @@ from lerobot.configs import PreTrainedConfig
 from lerobot.envs import preprocess_observation
 from lerobot.policies import PreTrainedPolicy, make_policy, make_pre_post_processors
 from lerobot.utils.constants import OBS_IMAGES
+from threadpoolctl import threadpool_limits
 
 from er_il.control.commander import BEST_EFFORT
-from er_il.envs.contract import NONE, check_policy, policy_contract
+from er_il.envs.contract import NONE, policy_contract
 from er_il.envs.decoders import decoder
 from er_il.envs.lerobot_plugin import ErIlEnvConfig
 from er_il.kinematics.rotation import Quaternion
@@ -30,12 +31,15 @@ POLICY_ROWS = 25
 def environment_of(
     policy: Path, task: str, decoder_name: str, on_invalid: str = BEST_EFFORT, posture: Sequence[float] = ()
 ) -> ErIlEnvConfig:
-    """Build the environment that a policy needs: its arm, its rotation code, its cameras."""
+    """Describe the environment that a policy needs: its arm, its rotation code, its cameras.
+
+    Check the policy against the environment that comes of it: :func:`er_il.envs.contract.check_policy`.
+    """
     chosen = decoder(decoder_name)
     contract = policy_contract(policy)
     images = _load_config(policy).image_features
     sizes = {feature.shape[-1] for feature in images.values()}
-    config = ErIlEnvConfig(
+    return ErIlEnvConfig(
         task=task,
         action_space=chosen.space,
         resolution=chosen.resolution,
@@ -46,8 +50,18 @@ def environment_of(
         cameras=[key.removeprefix(f"{OBS_IMAGES}.") for key in images],
         image_size=sizes.pop() if sizes else ErIlEnvConfig.image_size,
     )
-    check_policy(policy, config.space)
-    return config
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Compute with one thread: rounding depends on their number, and contact amplifies it into other outcomes."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        with threadpool_limits(1):
+            yield
+    finally:
+        torch.set_num_threads(threads)
 
 
 def _load_config(policy: Path) -> PreTrainedConfig:

@@ -19,12 +19,10 @@ from er_il.spaces.registry import check_space, split_name
 from er_il.spaces.spec import action_spec
 from er_il.support.atomic_files import write_atomically
 from er_il.support.errors import DatasetError, PolicyError
-from er_il.support.workers import end_with_parent
+from er_il.support.workers import ONE_THREAD, end_with_parent
 
 STOCK = "lerobot-train"
 IN_MEMORY = "er_il.policy.in_memory"  # the same, in less time
-# With two threads on two cores, a step of these small policies takes ten times as long as with one.
-ONE_THREAD = {"OMP_NUM_THREADS": "1"}
 PRECISION = "ACCELERATE_MIXED_PRECISION"  # heeded by lerobot-train: bf16 is faster where the processor knows it
 _CHECKPOINTS, _LAST, _PRETRAINED = "checkpoints", "last", "pretrained_model"
 
@@ -92,7 +90,7 @@ class Training:
 
     @property
     def finished(self) -> bool:
-        """Whether all steps are done."""
+        """True if all steps are done."""
         return self.done_steps >= self.steps
 
     @property
@@ -146,7 +144,7 @@ class Training:
         ).returncode
 
     def _renames(self, inputs: Mapping[str, Any]) -> bool:
-        """Whether the dataset has other inputs than the configuration names."""
+        """True if the dataset has other inputs than the configuration names."""
         return bool(inputs) and inputs.keys() != named_inputs(self.config).keys()
 
     def _episodes(self, info: Mapping[str, Any]) -> list[int]:

@@ -48,8 +48,8 @@ def _page(report: Report, figure: str, strips: list[str]) -> list[str]:
         page.append(f"Not complete: {', '.join(missing)}.")
     if _compared(report):
         page += ["## What differs from the paper", _differences(report)]
-    if meta["grid"]["sceptics"]:
-        page += ["## Would a fixed posture do?", _sceptics(report)]
+    if _baselines(report):
+        page += ["## Would a fixed posture do?", _postures(report)]
     if strips:
         page += ["## The same start through each decoder", *(f"![{name[:-4]}]({name})" for name in strips)]
     page += ["## Every cell", full_table(report), _legend(report), "## How it was made", _origin(report)]
@@ -117,8 +117,14 @@ def _sight(grid: Mapping[str, Any]) -> str:
     )
 
 
-def _sceptics(report: Report) -> str:
-    names = report["meta"]["grid"]["sceptics"]
+def _baselines(report: Report) -> list[str]:
+    """The posture baselines of a grid, which version 0.1.0 called sceptics."""
+    grid = report["meta"]["grid"]
+    return grid["posture_baselines" if "posture_baselines" in grid else "sceptics"]
+
+
+def _postures(report: Report) -> str:
+    names = _baselines(report)
     enough, not_enough = [], []
     for task in report["meta"]["grid"]["tasks"]:
         cells = [cell for cell in report["cells"] if cell["task"] == task and cell["decoder"] in names]

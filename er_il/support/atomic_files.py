@@ -10,7 +10,7 @@ from uuid import uuid4
 
 import numpy as np
 
-from er_il.support.folder_lock import LOCK, locked
+from er_il.support.folder_lock import LOCK, folder_lock
 
 PARTIAL = ".partial"  # in the name of every file and folder that is not complete
 
@@ -76,7 +76,7 @@ def work_folder(target: Path) -> Iterator[Path]:
     """
     work = target.with_name(target.name + PARTIAL)
     work.mkdir(parents=True, exist_ok=True)
-    with locked(work):
+    with folder_lock(work):
         try:
             yield work
         finally:

@@ -12,24 +12,13 @@ LOCK = ".lock"
 
 
 @contextmanager
-def sole_use(folder: Path) -> Iterator[None]:
+def folder_lock(folder: Path) -> Iterator[None]:
     """Work in a folder alone: what resumes from its files would be done twice, and half-written, by two.
 
     The operating system ends the lock with the process, however that ends.
 
     Raises:
         ErIlError: another process works in it.
-    """
-    with locked(folder):
-        yield
-
-
-@contextmanager
-def locked(folder: Path) -> Iterator[None]:
-    """Hold the lock of a folder.
-
-    Raises:
-        ErIlError: another process holds it.
     """
     lock = FileLock(folder / LOCK)
     try:

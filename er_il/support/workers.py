@@ -1,80 +1,64 @@
-"""Worker processes that end with their parent, however it ends."""
+"""Worker processes that end with their parent, however it ends, and compute with one thread each."""
 
 import ctypes
 import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
-from multiprocessing import connection, get_context, parent_process
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import BrokenExecutor, Executor, Future
+from functools import partial
 from typing import Any
+
+from loky import ProcessPoolExecutor, cpu_count
+
+# With two threads on two cores, a step of a small policy takes ten times as long as with one. Read by NumPy and
+# PyTorch when they are loaded: for processes that are about to start.
+ONE_THREAD = {"OMP_NUM_THREADS": "1"}
+# loky would replace a worker that has grown by 300 MB as a leaking one; importing LeRobot takes more.
+_ENVIRONMENT = ONE_THREAD | {"LOKY_MAX_MEMORY_LEAK_SIZE": "1e12"}
 
 _LIBC = ctypes.CDLL(None) if sys.platform == "linux" else None  # loaded here: little is safe between fork and exec
 _PR_SET_PDEATHSIG = 1
+_POLL = 0.5  # [s] between looks at the parent
 
 
 def cores() -> int:
     """Number of cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return cpu_count()
 
 
-@contextmanager
-def worker_pool(workers: int, initializer: Callable[..., None], *arguments: object) -> Iterator[ProcessPoolExecutor]:
-    """Yield a pool of fresh processes, each prepared by ``initializer(*arguments)``.
+class LocalExecutor(Executor):
+    """Runs functions in fresh processes of this machine; those that died are replaced.
 
-    On an exception, jobs that have not started are dropped. Workers are spawned, not forked: OpenGL
-    contexts and the threads of PyTorch do not survive a fork.
-    """
-    pool = _pool(workers, initializer, *arguments)
-    try:
-        yield pool
-    finally:
-        pool.shutdown(cancel_futures=True)
+    Use it in a ``with`` statement; an exception kills what still runs. What ran beside the process that died fails
+    too, with :class:`concurrent.futures.BrokenExecutor`, and may be submitted again. loky starts the processes
+    without a fork, which neither OpenGL contexts nor the threads of PyTorch survive.
 
-
-class LocalExecutor:
-    """Runs functions in processes of this machine, one thread each; a process that died is replaced.
-
-    Use it in a ``with`` statement. What ran beside the process that died fails too, with
-    :class:`BrokenProcessPool`, and may be submitted again.
+    Args:
+        workers: Number of processes.
+        initializer: Prepares each process.
+        arguments: Its arguments.
     """
 
-    def __init__(self, workers: int) -> None:
+    def __init__(self, workers: int, initializer: Callable[..., None] | None = None, *arguments: object) -> None:
         self.workers = workers
+        self._prepared = (os.getpid(), initializer, arguments)
+        self._pool = self._new_pool()
 
-    def __enter__(self) -> "LocalExecutor":
-        self._pool = _pool(self.workers, one_thread)
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        self._pool.shutdown(cancel_futures=True)
-
-    def submit(self, function: Callable[..., Any], /, *arguments: Any) -> "Future[Any]":
-        """Run a function in one of the processes."""
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> "Future[Any]":
         try:
-            return self._pool.submit(function, *arguments)
-        except BrokenProcessPool:
-            self._pool.shutdown()
-            self._pool = _pool(self.workers, one_thread)
-            return self._pool.submit(function, *arguments)
+            return self._pool.submit(fn, *args, **kwargs)
+        except BrokenExecutor:
+            self._pool = self._new_pool()
+            return self._pool.submit(fn, *args, **kwargs)
 
+    def __exit__(self, kind: type[BaseException] | None, *rest: object) -> None:
+        self._pool.shutdown(kill_workers=kind is not None)
 
-def one_thread() -> None:
-    """Let this process compute with one thread: more than cores make small matrices ten times slower."""
-    os.environ["OMP_NUM_THREADS"] = "1"
-
-
-def end_with_parent() -> None:
-    """Let this process, of a program that knows nothing of us, be killed when its parent dies (on Linux)."""
-    if _LIBC is not None:
-        _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-
-
-def _pool(workers: int, initializer: Callable[..., None], *arguments: object) -> ProcessPoolExecutor:
-    return ProcessPoolExecutor(workers, get_context("spawn"), _start, (initializer, arguments))
+    def _new_pool(self) -> ProcessPoolExecutor:
+        return ProcessPoolExecutor(self.workers, initializer=_start, initargs=self._prepared, env=_ENVIRONMENT)
 
 
 def run_jobs[T](
@@ -88,33 +72,29 @@ def run_jobs[T](
         advance: Called with the number of jobs done, and their total.
     """
     done: list[T] = []
-
-    def collect(results: Iterable[T]) -> list[T]:
-        for result in results:
-            done.append(result)
+    with LocalExecutor(workers) as executor:
+        calls = [partial(*job) if workers == 1 else executor.submit(*job).result for job in jobs]
+        for call in calls:
+            done.append(call())
             advance(len(done), len(jobs))
-        return done
-
-    if workers == 1:
-        return collect(function(*arguments) for function, *arguments in jobs)
-    with worker_pool(workers, _nothing) as pool:
-        running = [pool.submit(*job) for job in jobs]
-        return collect(job.result() for job in running)
+    return done
 
 
-def _nothing() -> None:
-    """Prepare nothing: the jobs bring all they need."""
+def end_with_parent() -> None:
+    """Let this process, of a program that knows nothing of us, be killed when its parent dies (on Linux)."""
+    if _LIBC is not None:
+        _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
-def _start(initializer: Callable[..., None], arguments: tuple[object, ...]) -> None:
-    # A parent that is killed cannot tell its workers; without this they would wait for jobs for ever.
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+def _start(parent: int, initializer: Callable[..., None] | None, arguments: tuple[object, ...]) -> None:
+    # loky's workers outlive a parent that is killed: they finish their job, and wait for others for ever.
+    threading.Thread(target=_end_without, args=(parent,), daemon=True).start()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
-    initializer(*arguments)
+    if initializer:
+        initializer(*arguments)
 
 
-def _end_with_parent() -> None:
-    parent = parent_process()
-    if parent is not None:
-        connection.wait([parent.sentinel])
-        os._exit(1)
+def _end_without(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(_POLL)
+    os._exit(1)

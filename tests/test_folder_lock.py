@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 
 from er_il.support.errors import ErIlError
-from er_il.support.folder_lock import sole_use
+from er_il.support.folder_lock import folder_lock
 
 HOLDER = """
 import sys, time
 from pathlib import Path
-from er_il.support.folder_lock import sole_use
-with sole_use(Path(sys.argv[1])):
+from er_il.support.folder_lock import folder_lock
+with folder_lock(Path(sys.argv[1])):
     print("in", flush=True)
     time.sleep(60)
 """
@@ -24,11 +24,14 @@ def test_a_second_command_is_refused_until_the_first_has_ended_however_it_ends(t
     try:
         assert holder.stdout
         assert holder.stdout.readline() == b"in\n"
-        with pytest.raises(ErIlError, match=r"Another command works in .*choose another --out"), sole_use(tmp_path):
+        with (
+            pytest.raises(ErIlError, match=r"Another command works in .*choose another --out"),
+            folder_lock(tmp_path),
+        ):
             pass
     finally:
         holder.kill()
         holder.wait()
     for _ in range(2):
-        with sole_use(tmp_path):
+        with folder_lock(tmp_path):
             pass
