@@ -31,7 +31,7 @@ def benchmark(
     from er_il.experiments.cluster import RayExecutor
     from er_il.experiments.plan import Plan
     from er_il.experiments.run import run
-    from er_il.report.benchmark_page import PAGE
+    from er_il.report.grid_page import PAGE
     from er_il.support.folder_lock import sole_use
     from er_il.support.workers import LocalExecutor, cores
 

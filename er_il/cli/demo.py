@@ -31,7 +31,7 @@ def demo(
     from er_il.cli.progress import make_progress
     from er_il.cli.table import results_table
     from er_il.experiments.demo import TASK, Demo
-    from er_il.report.success import PAGE
+    from er_il.report.demo_page import PAGE
     from er_il.support.workers import cores
 
     folder = out or Path("outputs") / ("demo" if task == TASK else task)

@@ -1,11 +1,21 @@
-"""``er-il study``: what the paper asks about action spaces, measured."""
+"""``er-il study``: studies of the action spaces along demonstrations."""
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import OmitArgPrefixes, Positional, subcommand
 
-REPORT = "report.json"
+from er_il.cli.table import write_study
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from er_il.arms.arm import Arm
+    from er_il.experiments.studies.joints import Demos
+
+Report = dict[str, Any]
 
 
 def joints(
@@ -23,35 +33,26 @@ def joints(
         training: Report of policies trained with several joints (decoders erj@<joint>), to compare the advice with.
         out: Folder of report.json, joints.png and the recorded demonstrations.
     """
-    from rich.console import Console
-
-    from er_il.cli.progress import make_progress
-    from er_il.experiments.studies.demos import study_demos
-    from er_il.experiments.studies.joint_notes import training_notes
     from er_il.experiments.studies.joints import study_joints
     from er_il.experiments.studies.prediction import predict, read_training
-    from er_il.report.joints_figure import plot
-    from er_il.support.atomic_files import write_json
-    from er_il.support.provenance import provenance
+    from er_il.report.joints import joints_figure, notes, training_notes
     from er_il.support.workers import cores
 
     cells = read_training(training) if training else []
-    console = Console()
-    with make_progress(console) as progress:
-        arm, of_sets = study_demos(demos, episodes, out / "demos", progress, cores())
-        bar = progress.add_task("Measure joints", total=None)
-        study = study_joints(
-            arm, of_sets, cores(), lambda done, total: progress.update(bar, completed=done, total=total)
-        )
-    report = study.report()
-    if training:
-        report["training"] = predict(report, cells)
-    meta = provenance() | {"demos": {name: len(paths) for name, paths in of_sets.items()}}
-    write_json(out / REPORT, {"meta": meta} | report)
-    plot(report, out / "joints.png")
-    for note in (*report["notes"], *training_notes(report)):
-        console.print(note, highlight=False)
-    console.print(f"{out / REPORT}\n{out / 'joints.png'}", highlight=False, soft_wrap=True)
+
+    def measure(arm: "Arm", of_sets: "Demos", advance: Callable[[int, int], object]) -> Report:
+        report = study_joints(arm, of_sets, cores(), advance)
+        return report | ({"training": predict(report, cells)} if training else {})
+
+    _study(
+        demos,
+        episodes,
+        out,
+        measure,
+        {},
+        lambda report: notes(report) + training_notes(report),
+        {"joints.png": joints_figure},
+    )
 
 
 def validity(
@@ -70,35 +71,20 @@ def validity(
         out: Folder of report.json, validity.png and the recorded demonstrations.
     """
     import numpy as np
-    from rich.console import Console
 
-    from er_il.cli.progress import make_progress
-    from er_il.experiments.studies.demos import study_demos
-    from er_il.experiments.studies.validity import study_validity
-    from er_il.experiments.studies.validity_report import report as summarised
-    from er_il.report.validity_figure import plot
-    from er_il.support.atomic_files import write_json
+    from er_il.experiments.studies.validity import study_validity, summarise
+    from er_il.report.validity import findings, validity_figure
     from er_il.support.errors import ErIlError
-    from er_il.support.provenance import provenance
     from er_il.support.workers import cores
 
     if samples < 1:
         raise ErIlError(f"{samples} samples are too few: at least one is needed.")
-    console = Console()
-    with make_progress(console) as progress:
-        arm, of_sets = study_demos(demos, episodes, out / "demos", progress, cores())
+
+    def measure(arm: "Arm", of_sets: "Demos", advance: Callable[[int, int], object]) -> Report:
         states = np.concatenate([path.measured for paths in of_sets.values() for path in paths])
-        bar = progress.add_task("Draw and decode actions", total=None)
-        outcomes = study_validity(
-            arm, states, samples, cores(), lambda done, total: progress.update(bar, completed=done, total=total)
-        )
-    report = summarised(outcomes)
-    meta = provenance() | {"arm": arm.name, "demos": {name: len(paths) for name, paths in of_sets.items()}}
-    write_json(out / REPORT, {"meta": meta | {"samples": samples}} | report)
-    plot(report, out / "validity.png")
-    for finding in report["findings"]:
-        console.print(finding, highlight=False)
-    console.print(f"{out / REPORT}\n{out / 'validity.png'}", highlight=False, soft_wrap=True)
+        return summarise(study_validity(arm, states, samples, cores(), advance))
+
+    _study(demos, episodes, out, measure, {"samples": samples}, findings, {"validity.png": validity_figure})
 
 
 def deltas(
@@ -114,28 +100,45 @@ def deltas(
         episodes: Demonstrations to record of a task, or to look at in a dataset.
         out: Folder of report.json and the recorded demonstrations.
     """
+    from er_il.experiments.studies.deltas import study_deltas
+    from er_il.report.tables import DELTA_COLUMNS, terminal_table
+
+    _study(
+        demos,
+        episodes,
+        out,
+        lambda arm, of_sets, advance: study_deltas(arm, of_sets),
+        {},
+        lambda report: [terminal_table(report["drifts"], DELTA_COLUMNS)],
+    )
+
+
+def _study(
+    names: tuple[str, ...],
+    episodes: int,
+    out: Path,
+    measure: "Callable[[Arm, Demos, Callable[[int, int], object]], Report]",
+    settings: dict[str, Any],
+    shown: Callable[[Report], list[Any]],
+    figures: "Mapping[str, Callable[[Report], Figure]]" = MappingProxyType({}),
+) -> None:
+    """Read or record demonstrations, measure, print what is ``shown`` of the report, write it and its figures."""
     from rich.console import Console
 
     from er_il.cli.progress import make_progress
-    from er_il.experiments.studies.deltas import study_deltas
     from er_il.experiments.studies.demos import study_demos
-    from er_il.support.atomic_files import write_json
     from er_il.support.provenance import provenance
     from er_il.support.workers import cores
 
     console = Console()
     with make_progress(console) as progress:
-        arm, of_sets = study_demos(demos, episodes, out / "demos", progress, cores())
-    report = study_deltas(arm, of_sets)
+        arm, of_sets = study_demos(names, episodes, out / "demos", progress, cores())
+        bar = progress.add_task("Measure", total=None)
+        report = measure(arm, of_sets, lambda done, total: progress.update(bar, completed=done, total=total))
     meta = provenance() | {"arm": arm.name, "demos": {name: len(paths) for name, paths in of_sets.items()}}
-    write_json(out / REPORT, {"meta": meta} | report)
-    for each in report["drifts"]:
-        console.print(
-            f"{each['space']}: {each['steps']} steps, joints off by {each['joints']:.1e} rad at most, "
-            f"end effector by {each['position']:.1e} m, {each['invalid']} invalid",
-            highlight=False,
-        )
-    console.print(str(out / REPORT), highlight=False, soft_wrap=True)
+    for each in shown(report):
+        console.print(each, highlight=False)
+    write_study({"meta": meta | settings} | report, out, console, figures)
 
 
 Study = (

@@ -14,7 +14,7 @@ from er_il.experiments.report import write_results
 from er_il.experiments.schedule import Executor, Schedule
 from er_il.experiments.strip import copy_strips, strips
 from er_il.experiments.view import View
-from er_il.report.benchmark_page import write_pages
+from er_il.report.grid_page import write_pages
 
 
 @dataclass(frozen=True)

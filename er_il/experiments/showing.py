@@ -10,9 +10,9 @@ from er_il.evaluation.recording import SUCCESS, record_rollout
 from er_il.evaluation.results import write_cells
 from er_il.evaluation.rollouts import Cell
 from er_il.experiments.schedule import Executor
-from er_il.report.animation import Panel, write_animation
-from er_il.report.pictures import Picture, Row, moments, write_film, write_strip
-from er_il.report.success import label_of, write_page
+from er_il.report.demo_page import write_page
+from er_il.report.films import Panel, Picture, Row, moments, write_animation, write_film, write_strip
+from er_il.report.style import label_of
 from er_il.support.provenance import provenance
 
 FILM_EVERY = 2  # control steps a picture: shadows make each expensive

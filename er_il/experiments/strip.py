@@ -13,8 +13,8 @@ from er_il.experiments.jobs import Train
 from er_il.experiments.plan import Plan
 from er_il.experiments.schedule import FileResult, Job
 from er_il.experiments.showing import telling_seed
-from er_il.report.pictures import Row, moments, write_strip
-from er_il.report.success import label_of
+from er_il.report.films import Row, moments, write_strip
+from er_il.report.style import label_of
 from er_il.support.atomic_files import write_whole
 
 DECODERS = ("joint", "erj", "task-nearest", "task-posture")  # as far as the grid has them
