@@ -11,8 +11,9 @@ from documented import documented
 
 from er_il import Arm, Status
 from er_il.cli import main
+from er_il.datasets.joint_path import JointPath
 from er_il.experiments.studies.prediction import predict, read_training
-from er_il.experiments.studies.validity import SIZES, Condition, measure, study_validity, summarise
+from er_il.experiments.studies.validity import SIZES, Condition, measure, study_validity
 from er_il.report.joints import notes, training_notes
 from er_il.spaces.joint_choice import choices
 from er_il.support.errors import DatasetError
@@ -61,9 +62,10 @@ def test_causes_are_told_apart():
 
 def test_all_spaces_get_the_same_states_and_errors_and_the_report_adds_up():
     told = []
-    actions = study_validity(PANDA, near_home(10), 1, 1, lambda done, total: told.append((done, total)))
-    assert told[-1] == (len(actions), len(actions)) == (120, 120)
-    report = json.loads(json.dumps(summarise(actions)))
+    path = JointPath(0, near_home(10), near_home(10))
+    report = study_validity(PANDA, {"swing": [path]}, 1, 1, lambda done, total: told.append((done, total)))
+    report = json.loads(json.dumps(report))
+    assert told[-1] == (len(report["cells"]), len(report["cells"])) == (120, 120)
     assert len(report["pooled"]) == 24 and "size" not in report["pooled"][0]
     assert sum(row["actions"] for row in report["pooled"]) == sum(cell["actions"] for cell in report["cells"]) == 120
     for row in report["pooled"]:

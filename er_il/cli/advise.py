@@ -8,8 +8,6 @@ from tyro.conf import OmitArgPrefixes, Positional
 from er_il.cli.arm_options import ArmOptions
 
 if TYPE_CHECKING:
-    from rich.progress import Progress, TaskID
-
     from er_il.arms.arm import Arm
     from er_il.experiments.studies.joints import Demos
 
@@ -35,8 +33,6 @@ def advise(
         json: File (.json) for all figures; with several arms, one each.
         plot: File (.png) for the picture; with several arms, one each.
     """
-    import functools
-
     from rich.console import Console
 
     from er_il.cli.progress import make_progress
@@ -57,8 +53,9 @@ def advise(
         reports = {}
         for label, (arm, demos) in found.items():
             bar = progress.add_task(f"Measure {label or arm.name}", total=None)
-            show = functools.partial(_show, progress, bar)
-            reports[label] = study_joints(arm, demos, cores(), show)
+            reports[label] = study_joints(
+                arm, demos, cores(), lambda done, total, bar=bar: progress.update(bar, completed=done, total=total)
+            )
     for label, report in reports.items():
         console.print(terminal_table(report["ranking"][:ROWS], joint_columns(report)))
         if (more := len(report["ranking"]) - ROWS) > 0:
@@ -94,10 +91,6 @@ def _arms(source: str, robot: ArmOptions, episodes: int) -> "dict[str, tuple[Arm
     read = read_joint_paths(find_dataset(source), wirings, cores())
     name = Path(source).resolve().name if Path(source).exists() else source
     return {each.label: (each.arm, {name: spread(each.paths, episodes)}) for each in read}
-
-
-def _show(progress: "Progress", bar: "TaskID", done: int, total: int) -> None:
-    progress.update(bar, completed=done, total=total)
 
 
 def _named(path: Path, label: str) -> Path:

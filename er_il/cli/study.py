@@ -1,8 +1,8 @@
 """``er-il study``: studies of the action spaces along demonstrations."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import OmitArgPrefixes, Positional, subcommand
@@ -15,23 +15,53 @@ if TYPE_CHECKING:
     from er_il.arms.arm import Arm
     from er_il.experiments.studies.joints import Demos
 
-Report = dict[str, Any]
+    Measure = Callable[[Arm, Demos, Callable[[int, int], object]], dict[str, Any]]
 
 
-def joints(
-    demos: Positional[tuple[str, ...]] = ("reach_cup",),
-    *,
-    episodes: int = 10,
-    training: Path | None = None,
-    out: Path = Path("outputs/study/joints"),
-) -> None:
+@dataclass(frozen=True)
+class StudyOptions:
+    """The demonstrations that a study looks at, and where its results go."""
+
+    demos: Positional[tuple[str, ...]] = ("reach_cup",)
+    """Folders of datasets of one arm, or tasks to record."""
+    episodes: int = 10
+    """Demonstrations to record of a task, or to look at in a dataset."""
+    out: Path | None = None
+    """Folder of report.json, the figure and the recorded demonstrations; outputs/study/<study> if omitted."""
+
+    def run(
+        self,
+        name: str,
+        measure: "Measure",
+        shown: Callable[[dict[str, Any]], list[Any]],
+        draw: "Callable[[Mapping[str, Any]], Figure] | None" = None,
+        **settings: object,
+    ) -> None:
+        """Measure, print what is ``shown`` of the report, write it and its figure."""
+        from rich.console import Console
+
+        from er_il.cli.progress import make_progress
+        from er_il.experiments.studies.demos import study_demos
+        from er_il.support.provenance import provenance
+        from er_il.support.workers import cores
+
+        console, out = Console(), self.out or Path("outputs/study") / name
+        with make_progress(console) as progress:
+            arm, of_sets = study_demos(self.demos, self.episodes, out / "demos", progress, cores())
+            bar = progress.add_task("Measure", total=None)
+            report = measure(arm, of_sets, lambda done, total: progress.update(bar, completed=done, total=total))
+        meta = provenance() | {"arm": arm.name, "demos": {each: len(paths) for each, paths in of_sets.items()}}
+        for each in shown(report):
+            console.print(each, highlight=False)
+        write_study({"meta": meta | settings} | report, out, console, {f"{name}.png": draw} if draw else {})
+
+
+def joints(study: OmitArgPrefixes[StudyOptions], *, training: Path | None = None) -> None:
     """Which joint should ERJ command? Singularities, branch flips and round trips with each one.
 
     Args:
-        demos: Folders of datasets of one arm, or tasks to record.
-        episodes: Demonstrations to record of a task, or to look at in a dataset.
+        study: Demonstrations and results.
         training: Report of policies trained with several joints (decoders erj@<joint>), to compare the advice with.
-        out: Folder of report.json, joints.png and the recorded demonstrations.
     """
     from er_il.experiments.studies.joints import study_joints
     from er_il.experiments.studies.prediction import predict, read_training
@@ -40,39 +70,21 @@ def joints(
 
     cells = read_training(training) if training else []
 
-    def measure(arm: "Arm", of_sets: "Demos", advance: Callable[[int, int], object]) -> Report:
-        report = study_joints(arm, of_sets, cores(), advance)
+    def measure(arm: "Arm", demos: "Demos", advance: Callable[[int, int], object]) -> dict[str, Any]:
+        report = study_joints(arm, demos, cores(), advance)
         return report | ({"training": predict(report, cells)} if training else {})
 
-    _study(
-        demos,
-        episodes,
-        out,
-        measure,
-        {},
-        lambda report: notes(report) + training_notes(report),
-        {"joints.png": joints_figure},
-    )
+    study.run("joints", measure, lambda report: notes(report) + training_notes(report), joints_figure)
 
 
-def validity(
-    demos: Positional[tuple[str, ...]] = ("reach_cup",),
-    *,
-    episodes: int = 10,
-    samples: int = 150,
-    out: Path = Path("outputs/study/validity"),
-) -> None:
+def validity(study: OmitArgPrefixes[StudyOptions], *, samples: int = 150) -> None:
     """Which actions are invalid, and why? Delta and absolute actions of growing size in task, ERJ and ERA.
 
     Args:
-        demos: Folders of datasets of one arm, or tasks to record.
-        episodes: Demonstrations to record of a task, or to look at in a dataset.
+        study: Demonstrations and results.
         samples: Actions of each size, in each space, around each kind of states.
-        out: Folder of report.json, validity.png and the recorded demonstrations.
     """
-    import numpy as np
-
-    from er_il.experiments.studies.validity import study_validity, summarise
+    from er_il.experiments.studies.validity import study_validity
     from er_il.report.validity import findings, validity_figure
     from er_il.support.errors import ErIlError
     from er_il.support.workers import cores
@@ -80,65 +92,22 @@ def validity(
     if samples < 1:
         raise ErIlError(f"{samples} samples are too few: at least one is needed.")
 
-    def measure(arm: "Arm", of_sets: "Demos", advance: Callable[[int, int], object]) -> Report:
-        states = np.concatenate([path.measured for paths in of_sets.values() for path in paths])
-        return summarise(study_validity(arm, states, samples, cores(), advance))
+    def measure(arm: "Arm", demos: "Demos", advance: Callable[[int, int], object]) -> dict[str, Any]:
+        return study_validity(arm, demos, samples, cores(), advance)
 
-    _study(demos, episodes, out, measure, {"samples": samples}, findings, {"validity.png": validity_figure})
+    study.run("validity", measure, findings, validity_figure, samples=samples)
 
 
-def deltas(
-    demos: Positional[tuple[str, ...]] = ("reach_cup",),
-    *,
-    episodes: int = 10,
-    out: Path = Path("outputs/study/deltas"),
-) -> None:
+def deltas(study: OmitArgPrefixes[StudyOptions]) -> None:
     """Do changes add up? Demonstrations as deltas in every space, decoded one after the other.
 
     Args:
-        demos: Folders of datasets of one arm, or tasks to record.
-        episodes: Demonstrations to record of a task, or to look at in a dataset.
-        out: Folder of report.json and the recorded demonstrations.
+        study: Demonstrations and results.
     """
     from er_il.experiments.studies.deltas import study_deltas
     from er_il.report.tables import DELTA_COLUMNS, terminal_table
 
-    _study(
-        demos,
-        episodes,
-        out,
-        lambda arm, of_sets, advance: study_deltas(arm, of_sets),
-        {},
-        lambda report: [terminal_table(report["drifts"], DELTA_COLUMNS)],
-    )
-
-
-def _study(
-    names: tuple[str, ...],
-    episodes: int,
-    out: Path,
-    measure: "Callable[[Arm, Demos, Callable[[int, int], object]], Report]",
-    settings: dict[str, Any],
-    shown: Callable[[Report], list[Any]],
-    figures: "Mapping[str, Callable[[Report], Figure]]" = MappingProxyType({}),
-) -> None:
-    """Read or record demonstrations, measure, print what is ``shown`` of the report, write it and its figures."""
-    from rich.console import Console
-
-    from er_il.cli.progress import make_progress
-    from er_il.experiments.studies.demos import study_demos
-    from er_il.support.provenance import provenance
-    from er_il.support.workers import cores
-
-    console = Console()
-    with make_progress(console) as progress:
-        arm, of_sets = study_demos(names, episodes, out / "demos", progress, cores())
-        bar = progress.add_task("Measure", total=None)
-        report = measure(arm, of_sets, lambda done, total: progress.update(bar, completed=done, total=total))
-    meta = provenance() | {"arm": arm.name, "demos": {name: len(paths) for name, paths in of_sets.items()}}
-    for each in shown(report):
-        console.print(each, highlight=False)
-    write_study({"meta": meta | settings} | report, out, console, figures)
+    study.run("deltas", study_deltas, lambda report: [terminal_table(report["drifts"], DELTA_COLUMNS)])
 
 
 Study = (

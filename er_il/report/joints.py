@@ -76,9 +76,10 @@ def joint_columns(report: Report) -> Columns:
     def over(column: Callable[[Fitness], str], of_set: Sequence[Fitness]) -> Callable[[Sequence[str]], str]:
         return lambda choice: column(_of(of_set, choice))
 
-    workspace = report["workspace"]
+    workspace, risk = report["workspace"], risks(report)
     return {
         "Commanded": lambda choice: f"`{joined(choice)}`",
+        "Risk": lambda choice: f"{risk[joined(choice)]:.1%}",
         "Self-motion": over(lambda each: f"{each['self_motion']:.2f}", workspace),
         "Near singular": over(lambda each: f"{each['near_singular']:.0%}", workspace),
         "Round-trip accuracy": over(lambda each: f"{1 - each['missed']:.1%}", workspace),

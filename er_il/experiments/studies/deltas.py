@@ -1,6 +1,6 @@
 """The study of delta actions: the error that accumulates when a demonstration's deltas are decoded one by one."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,12 +11,20 @@ from er_il.datasets.joint_path import JointPath
 from er_il.kinematics.solver import Status, kinematics_of
 from er_il.spaces import SPACES, make_action_space
 from er_il.spaces.delta import PREFIX, DeltaSpace
+from er_il.support.workers import run_jobs
 
 Array = NDArray[np.float64]
 
 
-def study_deltas(arm: Arm, demos: Mapping[str, Sequence[JointPath]]) -> dict[str, Any]:
+def study_deltas(
+    arm: Arm, demos: Mapping[str, Sequence[JointPath]], advance: Callable[[int, int], object]
+) -> dict[str, Any]:
     """Encode demonstrations as deltas and integrate them by decoding, in every space.
+
+    Args:
+        arm: The arm.
+        demos: Its demonstrations.
+        advance: Called with the number of spaces done, and their total.
 
     Returns:
         JSON with a row of ``drifts`` per space: the ``steps`` of all demonstrations and of the ``longest``, the number
@@ -28,8 +36,8 @@ def study_deltas(arm: Arm, demos: Mapping[str, Sequence[JointPath]]) -> dict[str
         ArmError: an ER space does not suit the arm.
     """
     paths = [path.commanded for of_set in demos.values() for path in of_set]
-    spaces = (make_action_space(PREFIX + kind, arm) for kind in SPACES)
-    return {"drifts": [_drift(space, paths) for space in spaces if isinstance(space, DeltaSpace)]}
+    spaces = [make_action_space(PREFIX + kind, arm) for kind in SPACES]
+    return {"drifts": run_jobs([(_drift, space, paths) for space in spaces], 1, advance)}
 
 
 def integrate(space: DeltaSpace, demo: Array) -> tuple[Array, int]:

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from er_il.arms.arm import Arm, Vector
 from er_il.control.commander import Commander
 from er_il.evaluation.statistics import exact_interval
+from er_il.experiments.studies.joints import Demos
 from er_il.kinematics.solver import Status
 from er_il.report.validity import SPACES, findings
 from er_il.spaces import ActionSpace, DeltaBounds, make_action_space
@@ -55,28 +56,26 @@ class Condition:
 
 
 def study_validity(
-    arm: Arm, demos: Array, samples: int, workers: int, advance: Callable[[int, int], object]
-) -> pd.DataFrame:
-    """Draw and decode actions under every condition.
+    arm: Arm, demos: Demos, samples: int, workers: int, advance: Callable[[int, int], object]
+) -> dict[str, Any]:
+    """Draw and decode actions under every condition; return everything as JSON.
 
     Args:
         arm: An arm with one redundant joint and frames for the arm angle.
-        demos: Joint angles (N, n) [rad] measured along demonstrations.
+        demos: Demonstrations, whose measured joint angles are the states.
         samples: Actions per condition.
         workers: Number of worker processes; with one, no process is started.
         advance: Called with the number of conditions done, and their total.
-
-    Returns:
-        A row per action: see :func:`measure`.
 
     Raises:
         ArmError: ERJ or ERA does not suit the arm.
     """
     for space in SPACES:
         make_action_space(space, arm)  # told before anything starts
+    measured = np.concatenate([path.measured for paths in demos.values() for path in paths])
     rng = np.random.default_rng(0)
     states = {
-        DEMOS: demos[rng.integers(len(demos), size=samples)],
+        DEMOS: measured[rng.integers(len(measured), size=samples)],
         RANDOM: rng.uniform(arm.lower, arm.upper, (samples, arm.dof)),
     }
     conditions = [
@@ -84,7 +83,7 @@ def study_validity(
         for around, mode, damped, space, size in itertools.product(states, MODES, (True, False), SPACES, SIZES)
     ]
     jobs = [(measure, condition, arm, states[condition.around]) for condition in conditions]
-    return pd.concat(run_jobs(jobs, workers, advance))
+    return summarise(pd.concat(run_jobs(jobs, workers, advance)))
 
 
 def measure(condition: Condition, arm: Arm, states: Array) -> pd.DataFrame:
