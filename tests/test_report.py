@@ -11,6 +11,8 @@ from figures import assert_readable, bars, error_bars, legend_of, points, ticks
 from matplotlib.image import imread
 from PIL import Image
 
+from er_il import Arm
+from er_il.datasets.verification import Checked, Verification
 from er_il.report.charts import demonstrations_figure, success_figure
 from er_il.report.demo_page import CHART, write_page
 from er_il.report.films import PAUSE, WIDTH, Panel, Row, moments, strip_figure, write_animation, write_film, write_strip
@@ -19,6 +21,9 @@ from er_il.report.joints import joints_figure
 from er_il.report.style import BAD, GOOD, LOOKS, OTHERS, looks_of
 from er_il.report.tables import compact_table, markdown_table, success_table, terminal_table
 from er_il.report.validity import validity_figure
+from er_il.report.verification import verification_figure, verification_notes
+from er_il.spaces import make_action_space
+from er_il.spaces.layout import Layout
 
 RESULTS = Path(__file__).resolve().parents[1] / "results"
 
@@ -282,3 +287,47 @@ def test_a_strip_shows_every_row(tmp_path: Path) -> None:
     strip, single = imread(tmp_path / "strip.png"), imread(tmp_path / "one.png")
     assert strip.shape[1] == single.shape[1]
     assert strip.shape[0] == pytest.approx(2 * single.shape[0], abs=2)
+
+
+def verified(count: int) -> Verification:
+    """Two episodes of an arm, the last frames of each flagged."""
+    episodes = tuple(
+        Checked(
+            number=number,
+            status=np.full((count, 1), "ok"),
+            error=np.full((count, 1), 1e-7) * np.arange(1, count + 1)[:, None],
+            flagged=np.arange(count)[:, None] >= count - 3,
+            conditioning=np.full((count, 1), 0.1 + number),
+            position_error=np.zeros((count, 1)),
+            rotation_error=np.zeros((count, 1)),
+        )
+        for number in range(2)
+    )
+    layout = Layout.of_space(make_action_space("erj", Arm.preset("panda")))
+    return Verification(layout, episodes, compared=True, suspicions={}, other_side={})
+
+
+def test_the_figure_of_a_verification_tells_flagged_frames_apart() -> None:
+    figure = verification_figure(verified(20), "a dataset")
+    errors, conditioning = figure.axes
+    shown = {str(line.get_label()): np.asarray(line.get_xdata(), dtype=int) for line in errors.lines}
+    assert shown["flagged"].tolist() == [17, 18, 19, 37, 38, 39]
+    assert sorted([*shown["not flagged"], *shown["flagged"]]) == list(range(40))
+    values = {float(np.asarray(line.get_ydata())[0]) for line in conditioning.lines if len(line.get_xdata()) == 20}  # pyright: ignore
+    assert values == {0.1, 1.1}
+    assert figure.get_suptitle() == "a dataset"
+    assert_readable(figure)
+
+
+def test_what_is_said_of_a_verification_names_frames_near_singularities_and_signs() -> None:
+    near = [{"episode": i, "arm": "panda", "first": 4, "last": 9, "smallest": 0.01} for i in range(7)]
+    report = {
+        "invalid_by_episode": {3: {"unreachable": 2, "jump": 1}},
+        "near_singularity": near,
+        "arms": {"panda": {"quaternions_other_side": 0.25}},
+    }
+    said = verification_notes(report)
+    assert said[0] == "Episode 3: unreachable 2, jump 1"
+    assert said[1] == "Episode 0, panda: near a singularity in frames 4 to 9 (smallest singular value 1.0e-02)"
+    assert len(said) == 8 and said[6] == "and 2 more in the report"
+    assert said[7].startswith("panda: 25.0% of the quaternions are beyond their hemisphere")
