@@ -207,8 +207,9 @@ def grid_folder(folder: Path, **grid: object) -> Path:
 
 
 def test_the_page_of_a_grid_shows_the_films_that_are_there(tmp_path: Path) -> None:
-    write_pages(grid_folder(tmp_path))
+    write_pages(grid_folder(tmp_path, recording_seed=7))
     assert "## Films" not in (tmp_path / "README.md").read_text()
+    assert "(recipe seed 7;" in (tmp_path / "README.md").read_text()
     for name in ("rollouts.webp", "erj.mp4", "erj.rrd", "joint.mp4", "strip_reach_cup.png"):
         (tmp_path / name).touch()
     write_pages(tmp_path)

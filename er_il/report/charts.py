@@ -17,6 +17,7 @@ Cells = Sequence[Mapping[str, Any]]
 GROUP_WIDTH = 0.8  # of the bars of a group, whose centres are 1 apart
 DODGE = 0.06  # shift between series that would hide each other: of the x axis, or octaves of a logarithmic one
 COUNTED = 12  # bars at most whose counts are written above them
+NARROWEST = 5.0  # [in] of a figure of bars: its legend needs room
 
 
 def where(data: pd.DataFrame, **values: object) -> pd.DataFrame:
@@ -111,7 +112,8 @@ def success_figure(cells: Cells, *, compared: bool = False) -> Figure:
     data = success_data(cells)
     looks = looks_of(dict.fromkeys(data["series"]))
     counted = len(cells) <= COUNTED
-    figure = new_figure(1 + data["task"].nunique() * (0.4 + (0.55 if counted else 0.18) * len(looks)), 3.8)
+    width = 1 + data["task"].nunique() * (0.4 + (0.55 if counted else 0.18) * len(looks))
+    figure = new_figure(max(NARROWEST, width), 3.8)
     axis = figure.subplots()
     positions = bar_chart(axis, data, looks)
     percent_axis(axis, "Success rate [%]")
