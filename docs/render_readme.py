@@ -11,11 +11,16 @@ from pathlib import Path
 from typing import Any
 
 from er_il.evaluation.results import RESULTS
-from er_il.experiments.studies.circle import drift_table
-from er_il.report.arms_table import round_trips_table
-from er_il.report.benchmark_table import compact_table
-from er_il.report.study_tables import deltas_table, joints_table, training_time_table, validity_table
-from er_il.report.success import REPORT, success_table
+from er_il.report.joints import joints_table
+from er_il.report.tables import (
+    compact_table,
+    deltas_table,
+    drift_table,
+    round_trips_table,
+    success_table,
+    training_time_table,
+)
+from er_il.report.validity import validity_table
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
@@ -40,7 +45,7 @@ def rendered(text: str) -> str:
         benchmark = ROOT / block[2] / RESULTS
         if benchmark.exists():
             return f"{block[1]}{compact_table(json.loads(benchmark.read_text()))}\n{block[3]}"
-        report = json.loads((ROOT / block[2] / REPORT).read_text())
+        report = json.loads((ROOT / block[2] / "report.json").read_text())
         return f"{block[1]}{next(table(report) for key, table in TABLES.items() if key in report)}\n{block[3]}"
 
     return BLOCK.sub(filled, text)

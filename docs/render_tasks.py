@@ -10,7 +10,7 @@ import gymnasium
 from PIL import Image
 
 from er_il.envs.tasks import task_id, task_names
-from er_il.report.pictures import Picture, moments
+from er_il.report.films import Picture, moments
 
 PICTURES = Path(__file__).parent / "images" / "tasks"
 SEED = 0

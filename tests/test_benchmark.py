@@ -28,8 +28,8 @@ from er_il.experiments.plan import Plan
 from er_il.experiments.results import write_results
 from er_il.experiments.schedule import Schedule
 from er_il.policy.training import PRECISION
-from er_il.report.benchmark_page import write_pages
-from er_il.report.benchmark_table import compact_table
+from er_il.report.grid_page import write_pages
+from er_il.report.tables import compact_table
 from er_il.support.errors import ErIlError, UnknownNameError
 
 PANDA = Arm.preset("panda")
@@ -261,16 +261,16 @@ def test_the_page_shows_what_was_counted(tmp_path: Path) -> None:
     assert row in compact_table(report()) and row in page
     assert (tmp_path / "table.md").read_text() in page + "\n"
     assert "| collision 197 |" in page and "-98.5 (" in page
-    for text in ("A title", "0123abc", "strip_reach_cup.png", "(table.png)", "trainings: bf16", "1.0 h", "0.5 h"):
+    for text in ("A title", "0123abc", "strip_reach_cup.png", "(table.png)", "training: bf16", "1.0 h", "0.5 h"):
         assert text in page
-    assert "200 rollouts a cell instead of 10" in page
-    assert "It is not enough on: `reach_cup`" in page
+    assert "200 rollouts per cell instead of 10" in page
+    assert "It is not sufficient on: `reach_cup`" in page
     assert imread(tmp_path / "table.png").std() > 0.05
     values = report(successes=200)
     values["meta"]["grid"]["sceptics"] = values["meta"]["grid"].pop("posture_baselines")  # as in version 0.1.0
     (tmp_path / "results.json").write_text(json.dumps(values))
     write_pages(tmp_path)
-    assert "That is enough on: `reach_cup` (`task-grasp`)" in (tmp_path / "README.md").read_text()
+    assert "A fixed posture is sufficient on: `reach_cup` (`task-grasp`)" in (tmp_path / "README.md").read_text()
 
 
 def test_several_numbers_of_demonstrations_are_drawn_as_curves(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""The hand on a circle: task space loses the elbow, the ER spaces keep it."""
+"""The end effector on a circle: in task space the elbow drifts, in the ER spaces it does not."""
 
 import json
 import sys
@@ -6,13 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from figures import assert_readable, points
 from lerobot.model import RobotKinematics
-from matplotlib.image import imread
 
 from er_il import Arm
 from er_il.arms.urdf import generated_urdf
 from er_il.cli import main
-from er_il.experiments.studies.circle import LAPS, POSES, drift_table, drive_all, targets
+from er_il.experiments.studies.circle import LAPS, POSES, RADIUS, drive_all, study_circle, targets
+from er_il.report.circle import circle_figure
+from er_il.report.tables import drift_table
 from er_il.support.errors import ArmError
 
 PANDA = Arm.preset("panda")
@@ -50,13 +52,37 @@ def test_the_command_writes_what_it_measured(
     report = json.loads((tmp_path / "new" / "report.json").read_text())
     assert report["meta"]["versions"]["lerobot"]
     assert [len(drive["drift"]) for drive in report["drives"]] == [LAPS] * 4
-    assert imread(tmp_path / "new" / "circle.png").std() > 0.05
+    assert (tmp_path / "new" / "circle.png").read_bytes()[:4] == b"\x89PNG"
     shown = capsys.readouterr().out
     for drive, line in zip(report["drives"], drift_table(report).splitlines()[2:], strict=True):
         drift = f"{100 * drive['drift'][-1]:.1f}"
         assert drift in shown
         assert f"| {drift} cm | " in line
     assert sorted(path.name for path in (tmp_path / "new").iterdir()) == ["circle.png", "report.json"]
+
+
+def test_the_figure_shows_the_arm_after_each_lap_and_the_drift():
+    report = study_circle(PANDA)
+    figure = circle_figure({**report, "meta": report["meta"] | {"versions": {"lerobot": "1.2.3"}}})
+    by_lerobot, by_erj, chart = figure.axes
+    drives = {drive["solver"]: drive for drive in report["drives"]}
+    for axis, solver in ((by_lerobot, "lerobot"), (by_erj, "erj")):
+        lines = [np.array(line.get_data_3d()).T for line in axis.lines]  # pyright: ignore[reportAttributeAccessIssue]
+        arms = [line for line in lines if len(line) == PANDA.dof + 2]
+        np.testing.assert_allclose(arms, drives[solver]["links"])
+        elbows = [line[0] for line in lines if len(line) == 1]
+        ends = np.linalg.norm(np.array(elbows[1:]) - elbows[0], axis=1)
+        np.testing.assert_allclose(ends[1:], drives[solver]["drift"], atol=1e-4)
+        circle = lines[-1][:, :2]
+        np.testing.assert_allclose(np.linalg.norm(circle - circle.mean(axis=0), axis=1), RADIUS, atol=1e-4)
+    for label, solver in (("LeRobot's IK", "lerobot"), ("er_il, task space", "task"), ("er_il, ERJ", "erj")):
+        np.testing.assert_allclose(points(chart)[label][1:], 100 * np.array(drives[solver]["drift"]))
+    shown = [text.get_text() for text in figure.texts]
+    assert "LeRobot 1.2.3's IK" in shown
+    assert f"elbow drift after {LAPS} laps: {100 * drives['lerobot']['drift'][-1]:.1f} cm" in shown
+    (legend,) = figure.legends
+    assert len(legend.get_texts()) == LAPS + 2
+    assert_readable(figure)
 
 
 def test_an_arm_without_an_elbow_is_refused():

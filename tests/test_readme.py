@@ -1,8 +1,12 @@
 """The pages' tables are those of the results they name, and of the tasks there are."""
 
 import runpy
+import shutil
 from pathlib import Path
 
+import pytest
+
+from er_il.report.grid_page import write_pages
 from sim_tasks import TASKS
 from sim_tasks.tasks.arm_task import RATE
 
@@ -20,6 +24,16 @@ def test_the_pages_tables_are_rendered_from_the_results() -> None:
     assert {"results/joints", "results/validity", "results/deltas", "results/panda8", "results/training_time"} <= set(
         found
     )
+
+
+@pytest.mark.parametrize("name", [path.parent.name for path in sorted(ROOT.glob("results/*/results.json"))])
+def test_the_grids_pages_are_rendered_from_their_results(name: str, tmp_path: Path) -> None:
+    for path in (ROOT / "results" / name).glob("*"):
+        if path.suffix in (".json", ".png"):
+            shutil.copy(path, tmp_path)
+    write_pages(tmp_path)
+    for page in ("README.md", "table.md"):
+        assert (tmp_path / page).read_text() == (ROOT / "results" / name / page).read_text()
 
 
 def test_every_task_is_in_the_tables_with_its_time() -> None:

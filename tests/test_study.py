@@ -11,10 +11,10 @@ from documented import documented
 
 from er_il import Arm, Status
 from er_il.cli import main
-from er_il.experiments.studies.joint_notes import notes
+from er_il.datasets.joint_path import JointPath
 from er_il.experiments.studies.prediction import predict, read_training
-from er_il.experiments.studies.validity import SIZES, Cell, measure, study_validity
-from er_il.experiments.studies.validity_report import report as validity_report
+from er_il.experiments.studies.validity import SIZES, Condition, measure, study_validity
+from er_il.report.joints import notes, training_notes
 from er_il.spaces.joint_choice import choices
 from er_il.support.errors import DatasetError
 
@@ -33,15 +33,15 @@ def near_home(count: int) -> np.ndarray:
 @pytest.mark.parametrize(("space", "mode"), [("task", "delta"), ("erj", "absolute"), ("era", "delta")])
 def test_larger_actions_are_more_often_invalid(space, mode):
     states = near_home(40)
-    outcomes = [
-        measure(Cell(space, mode, "demos", True, size), PANDA, states) for size in (SIZES[0], SIZES[2], SIZES[-1])
-    ]
-    invalid = [outcome.actions - outcome.statuses[Status.OK] for outcome in outcomes]
+    conditions = [Condition(space, mode, "demos", True, size) for size in (SIZES[0], SIZES[2], SIZES[-1])]
+    actions = [measure(condition, PANDA, states) for condition in conditions]
+    invalid = [int((each["status"] != Status.OK).sum()) for each in actions]
+    assert [len(each) for each in actions] == [40] * 3
     assert invalid == sorted(invalid)
     assert invalid[0] < 4
     assert invalid[-1] > 20
-    again = measure(outcomes[1].cell, PANDA, states)
-    assert (again.statuses, again.iterations) == (outcomes[1].statuses, outcomes[1].iterations)
+    again = measure(conditions[1], PANDA, states)
+    assert again.drop(columns="latency").equals(actions[1].drop(columns="latency"))
 
 
 def test_causes_are_told_apart():
@@ -51,8 +51,8 @@ def test_causes_are_told_apart():
     at_limit[5] = PANDA.upper[5] - 0.01
 
     def causes(q: np.ndarray, size: float) -> dict[str, int]:
-        outcome = measure(Cell("erj", "delta", "random", True, size), PANDA, np.tile(q, (60, 1)))
-        return outcome.report()["causes"]
+        actions = measure(Condition("erj", "delta", "random", True, size), PANDA, np.tile(q, (60, 1)))
+        return actions["status"].value_counts().reindex([each.value for each in Status], fill_value=0).to_dict()
 
     out, limited, far = causes(stretched, 0.05), causes(at_limit, 0.02), causes(PANDA.home, 0.2)
     assert out["unreachable"] > 30 > out["limit"] > out["jump"]
@@ -62,13 +62,15 @@ def test_causes_are_told_apart():
 
 def test_all_spaces_get_the_same_states_and_errors_and_the_report_adds_up():
     told = []
-    outcomes = study_validity(PANDA, near_home(10), 1, 1, lambda done, total: told.append((done, total)))
-    assert told[-1] == (len(outcomes), len(outcomes)) == (120, 120)
-    report = validity_report(outcomes)
+    path = JointPath(0, near_home(10), near_home(10))
+    report = study_validity(PANDA, {"swing": [path]}, 1, 1, lambda done, total: told.append((done, total)))
+    report = json.loads(json.dumps(report))
+    assert told[-1] == (len(report["cells"]), len(report["cells"])) == (120, 120)
+    assert len(report["pooled"]) == 24 and "size" not in report["pooled"][0]
     assert sum(row["actions"] for row in report["pooled"]) == sum(cell["actions"] for cell in report["cells"]) == 120
     for row in report["pooled"]:
         assert sum(row["causes"].values()) == row["invalid"]
-    assert [finding.split()[0] for finding in report["findings"]] == ["Around", "Around", "Without", "Decoding"]
+    assert [finding.split()[0] for finding in report["findings"]] == ["Around", "Around", "Without", "Decode"]
     assert "(paper 13 ms)" in report["findings"][-1]
 
 
@@ -105,7 +107,7 @@ def test_what_is_said_follows_from_the_numbers():
     said = " ".join(notes(joint_report()))
     assert "Command j1: 0.0% of the steps of reach" in said
     assert "redundancy lies among the joints that twist, j1, j3" in said
-    assert "Breaks here: j2 (70%)" in said
+    assert "Unsuitable here: j2 (70%)" in said
     assert "No demonstration comes near a singularity" in said
     near = [{"demos": "reach", "episode": 3, "first": 4, "last": 9, "smallest": 0.01}]
     mixed = [fitness("j1", 0.2, 0.1), fitness("j2", 0.6, 0.4), fitness("j3", 0.3, 0.5)]
@@ -113,6 +115,15 @@ def test_what_is_said_follows_from_the_numbers():
     assert "reach episode 3, steps 4 to 9" in said
     assert "among the joints that twist" not in said
     assert "ask for erj@j1" in said
+    crossed = notes(
+        joint_report(demos={"reach": [fitness("j1", 0.0) | {"folds": 1.5}, fitness("j2", 0.7), fitness("j3", 0.1)]})
+    )
+    assert any("crosses 1.5 of its folds" in note for note in crossed)
+    many = [{**near[0], "episode": i} for i in range(7)]
+    (listed,) = [note for note in notes(joint_report(near_singularity=many)) if note.startswith("Singularities near")]
+    assert "episode 4" in listed and "episode 5" not in listed and "and 2 more" in listed
+    (first, *_) = notes(joint_report(demos={}))
+    assert first == "Command j1: 20.0% of the workspace is near a singularity; 30.0% with the next best choice, j3."
 
 
 def cells(*successes: int) -> list[dict]:
@@ -126,11 +137,14 @@ def test_the_advice_is_checked_against_training():
     (right,) = predict(joint_report(), cells(50, 3, 40))
     assert right["rank_correlation"] == pytest.approx(1.0)
     assert right["top_choice_is_best"] and right["top_choice"] == "j1"
+    (note,) = training_notes({"training": [right]})
+    assert "the recommended choice, j1, is the best; rank correlation of low risk with success: 1.00. j1 50/50" in note
     (wrong,) = predict(joint_report(), cells(10, 50, 30))
     assert wrong["rank_correlation"] == pytest.approx(-1.0)
     assert not wrong["top_choice_is_best"] and not wrong["top_choice_within_interval_of_best"]
     (alike,) = predict(joint_report(demos={}), cells(50, 50, 50))
     assert alike["rank_correlation"] is None
+    assert "success: undefined, all choices do alike" in training_notes({"training": [alike]})[0]
     assert [row["risk"] for row in alike["choices"]] == [0.2, 0.6, 0.3]  # no demos of that task: the workspace
 
 

@@ -1,17 +1,13 @@
 """``er-il advise``: which joints ERJ should command, for an arm and its demonstrations."""
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tyro.conf import OmitArgPrefixes, Positional
 
 from er_il.cli.arm_options import ArmOptions
 
 if TYPE_CHECKING:
-    from rich.progress import Progress, TaskID
-    from rich.table import Table
-
     from er_il.arms.arm import Arm
     from er_il.experiments.studies.joints import Demos
 
@@ -37,13 +33,13 @@ def advise(
         json: File (.json) for all figures; with several arms, one each.
         plot: File (.png) for the picture; with several arms, one each.
     """
-    import functools
-
     from rich.console import Console
 
     from er_il.cli.progress import make_progress
     from er_il.experiments.studies.joints import study_joints
-    from er_il.report.joints_figure import plot as draw
+    from er_il.report.joints import joint_columns, joints_figure
+    from er_il.report.style import save
+    from er_il.report.tables import terminal_table
     from er_il.spaces.joint_choice import choices
     from er_il.support.atomic_files import write_json
     from er_il.support.provenance import provenance
@@ -52,18 +48,24 @@ def advise(
     console = Console()
     found = _arms(source, robot, episodes)
     for arm, _ in found.values():
-        choices(arm)  # an arm without redundancy is told before another one is measured
-    for label, (arm, demos) in found.items():
-        with make_progress(console) as progress:
-            show = functools.partial(_show, progress, progress.add_task(f"Measure {label or arm.name}", total=None))
-            report = study_joints(arm, demos, cores(), show).report()
-        console.print(_table(report))
+        choices(arm)  # an arm without redundancy is an error before another one is measured
+    with make_progress(console) as progress:
+        reports = {}
+        for label, (arm, demos) in found.items():
+            bar = progress.add_task(f"Measure {label or arm.name}", total=None)
+            reports[label] = study_joints(
+                arm, demos, cores(), lambda done, total, bar=bar: progress.update(bar, completed=done, total=total)
+            )
+    for label, report in reports.items():
+        console.print(terminal_table(report["ranking"][:ROWS], joint_columns(report)))
+        if (more := len(report["ranking"]) - ROWS) > 0:
+            console.print(f"and {more} more, with --json", highlight=False)
         for note in report["notes"]:
             console.print(note, highlight=False)
         if json:
             write_json(_named(json, label), {"meta": provenance() | {"source": source}} | report)
         if plot:
-            draw(report, _named(plot, label))
+            save(joints_figure(report), _named(plot, label))
 
 
 def _arms(source: str, robot: ArmOptions, episodes: int) -> "dict[str, tuple[Arm, Demos]]":
@@ -89,42 +91,6 @@ def _arms(source: str, robot: ArmOptions, episodes: int) -> "dict[str, tuple[Arm
     read = read_joint_paths(find_dataset(source), wirings, cores())
     name = Path(source).resolve().name if Path(source).exists() else source
     return {each.label: (each.arm, {name: spread(each.paths, episodes)}) for each in read}
-
-
-def _table(report: Mapping[str, Any]) -> "Table":
-    """The best choices over the workspace and along the demonstrations, one a row."""
-    from rich.table import Table
-
-    from er_il.experiments.studies.joint_notes import joined, risks
-
-    table = Table(box=None, header_style="bold")
-    table.add_column("Commanded", no_wrap=True)
-    headings = ["Risk", "Self-motion", "Near singular", "Round trips missed"]
-    demos = list(report["demos"].values())
-    headings += ["…along demos", "Folds crossed", "Flips played back"] * bool(demos)
-    for heading in headings:
-        table.add_column(heading, justify="right")
-    workspace = {joined(each["joints"]): each for each in report["workspace"]}
-    along = {joined(each["joints"]): each for of_set in demos for each in of_set}
-    for choice in report["ranking"][:ROWS]:
-        name = joined(choice)
-        each = workspace[name]
-        row = [
-            f"{risks(report)[name]:.1%}",
-            f"{each['self_motion']:.2f}",
-            f"{each['near_singular']:.0%}",
-            f"{each['missed']:.1%}",
-        ]
-        if demos:
-            row += [f"{along[name]['missed']:.1%}", f"{along[name]['folds']:.1f}", f"{along[name]['flips']:.1f}"]
-        table.add_row(name, *row, style="bold" if choice == report["recommended"] else None)
-    if len(workspace) > ROWS:
-        table.caption = f"and {len(workspace) - ROWS} more, with --json"
-    return table
-
-
-def _show(progress: "Progress", bar: "TaskID", done: int, total: int) -> None:
-    progress.update(bar, completed=done, total=total)
 
 
 def _named(path: Path, label: str) -> Path:

@@ -50,7 +50,7 @@ def report(console: "Console", outcome: "Outcome", folder: Path) -> None:
     import sys
 
     from er_il.cli.table import results_table
-    from er_il.report.benchmark_page import PAGE
+    from er_il.report.grid_page import PAGE
 
     console.print(results_table(outcome.report["cells"]))
     console.print(f"{folder / PAGE}", highlight=False, soft_wrap=True)

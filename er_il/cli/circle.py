@@ -1,10 +1,12 @@
-"""``er-il circle``: where the elbow goes while the hand repeats itself."""
+"""``er-il circle``: elbow drift while the end effector repeats a circle."""
 
 from pathlib import Path
 
+from er_il.cli.table import write_study
+
 
 def circle(*, arm: str = "panda", out: Path = Path("outputs/circle")) -> None:
-    """Lead an arm's hand around a circle, lap after lap, and watch its elbow.
+    """Lead an arm's end effector around a circle, lap after lap, and measure the drift of its elbow.
 
     The same poses are solved by LeRobot's own inverse kinematics and in er_il's action spaces.
 
@@ -13,22 +15,19 @@ def circle(*, arm: str = "panda", out: Path = Path("outputs/circle")) -> None:
         out: Folder of report.json and circle.png.
     """
     from rich.console import Console
-    from rich.table import Table
 
     from er_il.arms.arm import Arm
-    from er_il.experiments.studies.circle import NAMES, drive_all, write_report
-    from er_il.report.circle_plot import plot
+    from er_il.experiments.studies.circle import study_circle
+    from er_il.report.circle import circle_figure
+    from er_il.report.tables import drift_columns, terminal_table
+    from er_il.support.provenance import provenance
 
     console = Console()
-    chosen = Arm.preset(arm)
-    with console.status("Around the circle"):
-        drives = drive_all(chosen)
-    laps = range(1, len(drives[0].drift) + 1)
-    table = Table("elbow from its start [cm]", *(f"lap {lap}" for lap in laps), "hand off by [mm]")
-    for drive in drives:
-        drift = [f"{100 * each:.1f}" for each in drive.drift]
-        table.add_row(NAMES[drive.solver], *drift, f"{1e3 * drive.position_error:.2f}")
+    with console.status("Solving along the circle"):
+        report = study_circle(Arm.preset(arm))
+    report["meta"] = provenance() | report["meta"]
+    columns = {heading.replace("Elbow drift after lap", "Lap"): cell for heading, cell in drift_columns(report).items()}
+    table = terminal_table(report["drives"], columns)
+    table.title = "Elbow drift"
     console.print(table)
-    write_report(chosen, drives, out / "report.json")
-    plot(chosen, drives, out / "circle.png")
-    console.print(f"{out / 'report.json'}\n{out / 'circle.png'}", highlight=False, soft_wrap=True)
+    write_study(report, out, console, {"circle.png": circle_figure})

@@ -1,141 +1,113 @@
-"""``er-il study``: what the paper asks about action spaces, measured."""
+"""``er-il study``: studies of the action spaces along demonstrations."""
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import OmitArgPrefixes, Positional, subcommand
 
-REPORT = "report.json"
+from er_il.cli.table import write_study
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from er_il.arms.arm import Arm
+    from er_il.experiments.studies.joints import Demos
+
+    Measure = Callable[[Arm, Demos, Callable[[int, int], object]], dict[str, Any]]
 
 
-def joints(
-    demos: Positional[tuple[str, ...]] = ("reach_cup",),
-    *,
-    episodes: int = 10,
-    training: Path | None = None,
-    out: Path = Path("outputs/study/joints"),
-) -> None:
+@dataclass(frozen=True)
+class StudyOptions:
+    """The demonstrations that a study looks at, and where its results go."""
+
+    demos: Positional[tuple[str, ...]] = ("reach_cup",)
+    """Folders of datasets of one arm, or tasks to record."""
+    episodes: int = 10
+    """Demonstrations to record of a task, or to look at in a dataset."""
+    out: Path | None = None
+    """Folder of report.json, the figure and the recorded demonstrations; outputs/study/<study> if omitted."""
+
+    def run(
+        self,
+        name: str,
+        measure: "Measure",
+        shown: Callable[[dict[str, Any]], list[Any]],
+        draw: "Callable[[Mapping[str, Any]], Figure] | None" = None,
+        **settings: object,
+    ) -> None:
+        """Measure, print what is ``shown`` of the report, write it and its figure."""
+        from rich.console import Console
+
+        from er_il.cli.progress import make_progress
+        from er_il.experiments.studies.demos import study_demos
+        from er_il.support.provenance import provenance
+        from er_il.support.workers import cores
+
+        console, out = Console(), self.out or Path("outputs/study") / name
+        with make_progress(console) as progress:
+            arm, of_sets = study_demos(self.demos, self.episodes, out / "demos", progress, cores())
+            bar = progress.add_task("Measure", total=None)
+            report = measure(arm, of_sets, lambda done, total: progress.update(bar, completed=done, total=total))
+        meta = provenance() | {"arm": arm.name, "demos": {each: len(paths) for each, paths in of_sets.items()}}
+        for each in shown(report):
+            console.print(each, highlight=False)
+        write_study({"meta": meta | settings} | report, out, console, {f"{name}.png": draw} if draw else {})
+
+
+def joints(study: OmitArgPrefixes[StudyOptions], *, training: Path | None = None) -> None:
     """Which joint should ERJ command? Singularities, branch flips and round trips with each one.
 
     Args:
-        demos: Folders of datasets of one arm, or tasks to record.
-        episodes: Demonstrations to record of a task, or to look at in a dataset.
+        study: Demonstrations and results.
         training: Report of policies trained with several joints (decoders erj@<joint>), to compare the advice with.
-        out: Folder of report.json, joints.png and the recorded demonstrations.
     """
-    from rich.console import Console
-
-    from er_il.cli.progress import make_progress
-    from er_il.experiments.studies.demos import study_demos
-    from er_il.experiments.studies.joint_notes import training_notes
     from er_il.experiments.studies.joints import study_joints
     from er_il.experiments.studies.prediction import predict, read_training
-    from er_il.report.joints_figure import plot
-    from er_il.support.atomic_files import write_json
-    from er_il.support.provenance import provenance
+    from er_il.report.joints import joints_figure, notes, training_notes
     from er_il.support.workers import cores
 
     cells = read_training(training) if training else []
-    console = Console()
-    with make_progress(console) as progress:
-        arm, of_sets = study_demos(demos, episodes, out / "demos", progress, cores())
-        bar = progress.add_task("Measure joints", total=None)
-        study = study_joints(
-            arm, of_sets, cores(), lambda done, total: progress.update(bar, completed=done, total=total)
-        )
-    report = study.report()
-    if training:
-        report["training"] = predict(report, cells)
-    meta = provenance() | {"demos": {name: len(paths) for name, paths in of_sets.items()}}
-    write_json(out / REPORT, {"meta": meta} | report)
-    plot(report, out / "joints.png")
-    for note in (*report["notes"], *training_notes(report)):
-        console.print(note, highlight=False)
-    console.print(f"{out / REPORT}\n{out / 'joints.png'}", highlight=False, soft_wrap=True)
+
+    def measure(arm: "Arm", demos: "Demos", advance: Callable[[int, int], object]) -> dict[str, Any]:
+        report = study_joints(arm, demos, cores(), advance)
+        return report | ({"training": predict(report, cells)} if training else {})
+
+    study.run("joints", measure, lambda report: notes(report) + training_notes(report), joints_figure)
 
 
-def validity(
-    demos: Positional[tuple[str, ...]] = ("reach_cup",),
-    *,
-    episodes: int = 10,
-    samples: int = 150,
-    out: Path = Path("outputs/study/validity"),
-) -> None:
+def validity(study: OmitArgPrefixes[StudyOptions], *, samples: int = 150) -> None:
     """Which actions are invalid, and why? Delta and absolute actions of growing size in task, ERJ and ERA.
 
     Args:
-        demos: Folders of datasets of one arm, or tasks to record.
-        episodes: Demonstrations to record of a task, or to look at in a dataset.
+        study: Demonstrations and results.
         samples: Actions of each size, in each space, around each kind of states.
-        out: Folder of report.json, validity.png and the recorded demonstrations.
     """
-    import numpy as np
-    from rich.console import Console
-
-    from er_il.cli.progress import make_progress
-    from er_il.experiments.studies.demos import study_demos
     from er_il.experiments.studies.validity import study_validity
-    from er_il.experiments.studies.validity_report import report as summarised
-    from er_il.report.validity_figure import plot
-    from er_il.support.atomic_files import write_json
+    from er_il.report.validity import findings, validity_figure
     from er_il.support.errors import ErIlError
-    from er_il.support.provenance import provenance
     from er_il.support.workers import cores
 
     if samples < 1:
         raise ErIlError(f"{samples} samples are too few: at least one is needed.")
-    console = Console()
-    with make_progress(console) as progress:
-        arm, of_sets = study_demos(demos, episodes, out / "demos", progress, cores())
-        states = np.concatenate([path.measured for paths in of_sets.values() for path in paths])
-        bar = progress.add_task("Draw and decode actions", total=None)
-        outcomes = study_validity(
-            arm, states, samples, cores(), lambda done, total: progress.update(bar, completed=done, total=total)
-        )
-    report = summarised(outcomes)
-    meta = provenance() | {"arm": arm.name, "demos": {name: len(paths) for name, paths in of_sets.items()}}
-    write_json(out / REPORT, {"meta": meta | {"samples": samples}} | report)
-    plot(report, out / "validity.png")
-    for finding in report["findings"]:
-        console.print(finding, highlight=False)
-    console.print(f"{out / REPORT}\n{out / 'validity.png'}", highlight=False, soft_wrap=True)
+
+    def measure(arm: "Arm", demos: "Demos", advance: Callable[[int, int], object]) -> dict[str, Any]:
+        return study_validity(arm, demos, samples, cores(), advance)
+
+    study.run("validity", measure, findings, validity_figure, samples=samples)
 
 
-def deltas(
-    demos: Positional[tuple[str, ...]] = ("reach_cup",),
-    *,
-    episodes: int = 10,
-    out: Path = Path("outputs/study/deltas"),
-) -> None:
+def deltas(study: OmitArgPrefixes[StudyOptions]) -> None:
     """Do changes add up? Demonstrations as deltas in every space, decoded one after the other.
 
     Args:
-        demos: Folders of datasets of one arm, or tasks to record.
-        episodes: Demonstrations to record of a task, or to look at in a dataset.
-        out: Folder of report.json and the recorded demonstrations.
+        study: Demonstrations and results.
     """
-    from rich.console import Console
-
-    from er_il.cli.progress import make_progress
     from er_il.experiments.studies.deltas import study_deltas
-    from er_il.experiments.studies.demos import study_demos
-    from er_il.support.atomic_files import write_json
-    from er_il.support.provenance import provenance
-    from er_il.support.workers import cores
+    from er_il.report.tables import DELTA_COLUMNS, terminal_table
 
-    console = Console()
-    with make_progress(console) as progress:
-        arm, of_sets = study_demos(demos, episodes, out / "demos", progress, cores())
-    report = study_deltas(arm, of_sets)
-    meta = provenance() | {"arm": arm.name, "demos": {name: len(paths) for name, paths in of_sets.items()}}
-    write_json(out / REPORT, {"meta": meta} | report)
-    for each in report["drifts"]:
-        console.print(
-            f"{each['space']}: {each['steps']} steps, joints off by {each['joints']:.1e} rad at most, "
-            f"end effector by {each['position']:.1e} m, {each['invalid']} invalid",
-            highlight=False,
-        )
-    console.print(str(out / REPORT), highlight=False, soft_wrap=True)
+    study.run("deltas", study_deltas, lambda report: [terminal_table(report["drifts"], DELTA_COLUMNS)])
 
 
 Study = (

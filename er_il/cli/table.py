@@ -1,29 +1,34 @@
-"""Results as a table in the terminal."""
+"""Results in the terminal and on disk, as several commands show them."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from rich.table import Table
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from rich.console import Console
+    from rich.table import Table
 
-from er_il.support.counts import tally
+HEADINGS = ("Task", "Decoder", "Success", "95 % interval", "Failures", "Invalid actions")
 
 
-def results_table(cells: Sequence[Mapping[str, Any]]) -> Table:
-    """Show reported cells, one a row."""
-    table = Table(box=None, header_style="bold")
-    for heading in ("Task", "Decoder"):
-        table.add_column(heading)
-    for heading in ("Success", "95 % interval", "Invalid"):
-        table.add_column(heading, justify="right")
-    table.add_column("Failures")
-    for cell in cells:
-        low, high = cell["interval"]
-        table.add_row(
-            cell["task"],
-            cell["decoder"],
-            f"{cell['successes']}/{cell['episodes']}",
-            f"{low:.1%} to {high:.1%}",
-            f"{cell['invalid_rate']:.1%}",
-            tally(cell["failures"]) or "none",
-        )
-    return table
+def results_table(cells: Sequence[Mapping[str, Any]]) -> "Table":
+    """Reported cells, one a row."""
+    from er_il.report.tables import success_columns, terminal_table
+
+    columns = success_columns(cells)
+    return terminal_table(cells, {heading: columns[heading] for heading in HEADINGS})
+
+
+def write_study(
+    report: dict[str, Any], out: Path, console: "Console", figures: "Mapping[str, Callable[[dict[str, Any]], Figure]]"
+) -> None:
+    """Write ``report.json`` and the figures, by file name, that are drawn from it; print their paths."""
+    from er_il.report.style import save
+    from er_il.support.atomic_files import write_json
+
+    write_json(out / "report.json", report)
+    for name, draw in figures.items():
+        save(draw(report), out / name)
+    for name in ("report.json", *figures):
+        console.print(str(out / name), highlight=False, soft_wrap=True)

@@ -15,9 +15,8 @@ from er_il.evaluation.trace import Trace
 from er_il.experiments.grid import Cell
 from er_il.experiments.jobs import Film
 from er_il.experiments.plan import Plan
-from er_il.report.animation import Panel, write_animation
-from er_il.report.pictures import Row, moments, write_strip
-from er_il.report.success import label_of
+from er_il.report.films import Panel, Row, moments, write_animation, write_strip
+from er_il.report.style import label_of
 from er_il.support.atomic_files import write_atomically
 
 PICTURES = 5  # of a rollout in a strip

@@ -24,7 +24,7 @@ from er_il.experiments.grid import Grid
 from er_il.experiments.schedule import FileResult, Job
 from er_il.policy.configuration import default_config
 from er_il.policy.training import PRECISION, Training, train_episodes
-from er_il.report.pictures import write_film
+from er_il.report.films import write_film
 from er_il.spaces.registry import arm_space_from_spec
 from er_il.spaces.spec import action_spec
 from er_il.support.atomic_files import write_json

@@ -12,7 +12,7 @@ from er_il.experiments.films import films, show_films, show_strip
 from er_il.experiments.plan import Plan
 from er_il.experiments.results import write_results
 from er_il.experiments.schedule import Executor, Job, Schedule
-from er_il.report.benchmark_page import write_pages
+from er_il.report.grid_page import write_pages
 
 FILMED = ("joint", "erj", "task-nearest", "task-posture")  # as far as the grid has them
 

@@ -1,15 +1,14 @@
-"""The end effector on a circle, lap after lap: where does the elbow go?
+"""Elbow drift of inverse kinematics along a repeated circle.
 
-The hand's pose repeats with every lap. Inverse kinematics that is told the pose alone takes, each
-time, the joints nearest to where they are; small steps add up, and after a lap the elbow is not
-where it was. ERJ commands one more joint, so the same action means the same arm.
+The end effector's pose repeats with every lap. Inverse kinematics that is given the pose alone takes, each time, the
+joints nearest to the current ones; small steps add up, and after a lap the elbow is elsewhere. ERJ commands one more
+joint, so that the same action means the same configuration.
 
 Everything is kinematics: each solution is the seed of the next, as on an arm that follows exactly.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,12 +18,9 @@ from numpy.typing import NDArray
 from er_il.arms.arm import Arm, Vector
 from er_il.arms.urdf import generated_urdf
 from er_il.kinematics.solver import kinematics_of
-from er_il.report.markdown import markdown_table
 from er_il.spaces.pose import PoseSpace
 from er_il.spaces.registry import make_arm_space
-from er_il.support.atomic_files import write_json
 from er_il.support.errors import ArmError
-from er_il.support.provenance import provenance
 
 Array = NDArray[np.float64]
 Solver = Callable[[Array, Vector], Vector]  # T_base_ee (4, 4) and a seed (n,) [rad] to joints (n,) [rad]
@@ -32,17 +28,17 @@ Solver = Callable[[Array, Vector], Vector]  # T_base_ee (4, 4) and a seed (n,) [
 RADIUS = 0.1  # [m]
 LAPS = 5
 POSES = 100  # a lap: five seconds at 20 Hz
-LEROBOT = "lerobot"
-OURS = ("task", "erj", "era")
-NAMES = {LEROBOT: "LeRobot's IK", "task": "er_il, task space", "erj": "er_il, ERJ", "era": "er_il, ERA"}
+DIGITS = 5  # of positions [m] in the report
+EVERY = 5  # poses, of the elbow's path in the report
 
 
 @dataclass(frozen=True)
 class Drive:
-    """One way of solving, driven around the circle."""
+    """One solver, driven around the circle."""
 
-    solver: str
+    solver: str  # "lerobot", or a kind of action space
     q: Array  # (LAPS * POSES + 1, n) [rad], the start first
+    links: Array  # (LAPS + 1, n + 2, 3) [m] base, joints and end effector in the base frame at the end of each lap
     elbow: Array  # (LAPS * POSES + 1, 3) [m] in the base frame
     position_error: float  # [m] largest distance of the end effector from its target
     rotation_error: float  # [rad]
@@ -59,6 +55,8 @@ class Drive:
             "drift": self.drift.tolist(),
             "max_position_error": self.position_error,
             "max_rotation_error": self.rotation_error,
+            "links": self.links.round(DIGITS).tolist(),
+            "elbow": self.elbow[::EVERY].round(DIGITS).tolist(),
         }
 
 
@@ -75,42 +73,36 @@ def drive_all(arm: Arm) -> list[Drive]:
     """Drive an arm around by LeRobot's inverse kinematics and in our action spaces, from its home posture.
 
     Raises:
-        ArmError: the arm has no spare joint, or no elbow is declared.
+        ArmError: the arm has no redundancy, or no elbow is declared.
     """
     if arm.angle_frames is None or not arm.redundancy:
         raise ArmError(f"{arm.name} has no elbow to watch: it needs more than six joints, and angle frames.")
-    solvers = {LEROBOT: _lerobot(arm)} | {kind: _ours(kind, arm) for kind in OURS}
-    return [_drive(name, solve, arm) for name, solve in solvers.items()]
+    solvers = {"lerobot": _lerobot(arm)} | {kind: _ours(kind, arm) for kind in ("task", "erj", "era")}
+    return [_drive(name, solve, arm, arm.angle_frames.elbow) for name, solve in solvers.items()]
 
 
-def write_report(arm: Arm, drives: Sequence[Drive], path: Path) -> None:
-    """Write what was measured, and how, as JSON."""
+def study_circle(arm: Arm) -> dict[str, Any]:
+    """Drive an arm around; return what :func:`er_il.report.circle.circle_figure` draws, as JSON.
+
+    Raises:
+        ArmError: see :func:`drive_all`.
+    """
+    drives = [drive.report() for drive in drive_all(arm)]
+    circle = targets(arm)[:POSES, :3, 3].round(DIGITS).tolist()
     how = {"arm": arm.name, "start": arm.home.tolist(), "radius": RADIUS, "laps": LAPS, "poses_a_lap": POSES}
-    write_json(path, {"meta": provenance() | how, "drives": [drive.report() for drive in drives]})
+    return {"meta": how | {"circle": circle}, "drives": drives}
 
 
-def drift_table(report: Mapping[str, Any]) -> str:
-    """Render a report as a Markdown table."""
-    laps = range(1, report["meta"]["laps"] + 1)
-    headings = ["Elbow from its start after", *(f"lap {lap}" for lap in laps), "Hand off its way by at most"]
-    rows = []
-    for drive in report["drives"]:
-        drift = [f"{100 * each:.1f} cm" for each in drive["drift"]]
-        rows.append([NAMES[drive["solver"]], *drift, f"{1e3 * drive['max_position_error']:.2f} mm"])
-    return markdown_table(headings, rows)
-
-
-def _drive(name: str, solve: Solver, arm: Arm) -> Drive:
+def _drive(name: str, solve: Solver, arm: Arm, elbow: str) -> Drive:
     kinematics, poses = kinematics_of(arm), targets(arm)
     path = [arm.home]
     for pose in poses:
         path.append(solve(pose, path[-1]))
     q = np.array(path)
-    misses = np.array([kinematics.pose_error(pose, each) for pose, each in zip(poses, q[1:], strict=True)])
-    assert arm.angle_frames is not None
-    elbow = kinematics.fk_batch(q, arm.angle_frames.elbow)[:, :3, 3]
-    position, rotation = misses.max(axis=0)
-    return Drive(name, q, elbow, float(position), float(rotation))
+    errors = np.array([kinematics.pose_error(pose, each) for pose, each in zip(poses, q[1:], strict=True)])
+    frames = (arm.base_frame, *arm.joints, arm.ee_frame)
+    links = np.stack([kinematics.fk_batch(q[::POSES], frame)[:, :3, 3] for frame in frames], axis=1)
+    return Drive(name, q, links, kinematics.fk_batch(q, elbow)[:, :3, 3], *errors.max(axis=0).tolist())
 
 
 def _lerobot(arm: Arm) -> Solver:
@@ -125,7 +117,7 @@ def _lerobot(arm: Arm) -> Solver:
 
 
 def _ours(kind: str, arm: Arm) -> Solver:
-    """An action space, told the pose and the redundancy that the start has."""
+    """An action space, given the pose and the redundancy value of the start."""
     space = make_arm_space(kind, arm)
     assert isinstance(space, PoseSpace)
     redundancy = space.redundancy_along(arm.home[None])[0]

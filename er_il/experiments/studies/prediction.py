@@ -1,4 +1,4 @@
-"""Whether the adviser's ranking of ERJ's joints predicts how policies do that were trained with them."""
+"""How well the adviser's ranking of ERJ's joints predicts the success of policies trained with them."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import spearmanr
 
-from er_il.experiments.studies.joint_notes import joined
+from er_il.report.tables import joined
 from er_il.spaces.registry import split_name
 from er_il.support.errors import DatasetError
 
@@ -37,7 +37,7 @@ def predict(report: Mapping[str, Any], cells: Sequence[Mapping[str, Any]]) -> li
     over the workspace.
 
     Args:
-        report: See :meth:`er_il.experiments.studies.joints.JointStudy.report`.
+        report: See :func:`er_il.experiments.studies.joints.study_joints`.
         cells: See :func:`read_training`.
 
     Returns:

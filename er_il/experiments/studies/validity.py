@@ -1,4 +1,4 @@
-"""The paper's study of invalid actions: how many there are in each space, why, and what decoding them costs.
+"""The paper's study of invalid actions: their share in each space, their causes, and the cost of decoding them.
 
 Actions are drawn around states of demonstrations and around random configurations:
 
@@ -18,12 +18,15 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from er_il.arms.arm import Arm, Vector
 from er_il.control.commander import Commander
 from er_il.evaluation.statistics import exact_interval
+from er_il.experiments.studies.joints import Demos
 from er_il.kinematics.solver import Status
+from er_il.report.validity import SPACES, findings
 from er_il.spaces.base import ArmSpace
 from er_il.spaces.delta import DeltaBounds, DeltaSpace
 from er_il.spaces.pose import PoseSpace
@@ -32,17 +35,18 @@ from er_il.support.workers import run_jobs
 
 Array = NDArray[np.float64]
 
-SPACES = ("task", "erj", "era")
 MODES = ("delta", "absolute")
 DEMOS, RANDOM = "demos", "random"
 SIZES = (0.01, 0.02, 0.05, 0.1, 0.2)  # [m]
 TURN = 3.0  # [rad/m] the ratio of a delta space's declared bounds
 PERIOD = 0.05  # [s] of control, by which a jump is judged
 WARM_UP = 20  # decodes before the clock counts: the first ones build programs
+PAPER_MS = {"task": 12.0, "erj": 19.0, "era": 13.0}  # computation and execution times that the paper reports
+KEYS = ["space", "mode", "around", "damped", "size"]  # of a condition
 
 
 @dataclass(frozen=True)
-class Cell:
+class Condition:
     """Actions of one size in one space, around one kind of states, through one solver."""
 
     space: str
@@ -52,100 +56,110 @@ class Cell:
     size: float  # [m]
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """What became of a cell's actions."""
-
-    cell: Cell
-    statuses: Counter[str]
-    iterations: tuple[int, ...]
-    latencies: tuple[float, ...]  # [s] of processor time
-
-    @property
-    def actions(self) -> int:
-        """Number of actions."""
-        return self.statuses.total()
-
-    def report(self) -> dict[str, Any]:
-        """Return the outcome as JSON."""
-        invalid = self.actions - self.statuses[Status.OK]
-        p50, p99 = (1e3 * np.percentile(self.latencies, [50, 99])).tolist()
-        return vars(self.cell) | {
-            "actions": self.actions,
-            "invalid": invalid,
-            "invalid_rate": invalid / self.actions,
-            "interval": exact_interval(invalid, self.actions),
-            "causes": {status.value: self.statuses[status] for status in Status if status is not Status.OK},
-            "iterations_p50": float(np.percentile(self.iterations, 50)),
-            "iterations_p99": float(np.percentile(self.iterations, 99)),
-            "decode_p50_ms": p50,
-            "decode_p99_ms": p99,
-        }
-
-
 def study_validity(
-    arm: Arm, demos: Array, samples: int, workers: int, advance: Callable[[int, int], object]
-) -> list[Outcome]:
-    """Draw and decode actions in every cell.
+    arm: Arm, demos: Demos, samples: int, workers: int, advance: Callable[[int, int], object]
+) -> dict[str, Any]:
+    """Draw and decode actions under every condition; return everything as JSON.
 
     Args:
         arm: An arm with one redundant joint and frames for the arm angle.
-        demos: Joint angles (N, n) [rad] measured along demonstrations.
-        samples: Actions a cell.
+        demos: Demonstrations, whose measured joint angles are the states.
+        samples: Actions per condition.
         workers: Number of worker processes; with one, no process is started.
-        advance: Called with the number of cells done, and their total.
+        advance: Called with the number of conditions done, and their total.
 
     Raises:
         ArmError: ERJ or ERA does not suit the arm.
     """
     for space in SPACES:
         make_arm_space(space, arm)  # told before anything starts
+    measured = np.concatenate([path.measured for paths in demos.values() for path in paths])
     rng = np.random.default_rng(0)
     states = {
-        DEMOS: demos[rng.integers(len(demos), size=samples)],
+        DEMOS: measured[rng.integers(len(measured), size=samples)],
         RANDOM: rng.uniform(arm.lower, arm.upper, (samples, arm.dof)),
     }
-    cells = [
-        Cell(space, mode, around, damped, size)
+    conditions = [
+        Condition(space, mode, around, damped, size)
         for around, mode, damped, space, size in itertools.product(states, MODES, (True, False), SPACES, SIZES)
     ]
-    jobs = [(measure, cell, arm, states[cell.around]) for cell in cells]
-    return run_jobs(jobs, workers, advance)
+    jobs = [(measure, condition, arm, states[condition.around]) for condition in conditions]
+    return summarise(pd.concat(run_jobs(jobs, workers, advance)))
 
 
-def measure(cell: Cell, arm: Arm, states: Array) -> Outcome:
-    """Draw an action at each state (N, n) [rad], and decode it."""
-    absolute = make_arm_space(cell.space, arm)
+def measure(condition: Condition, arm: Arm, states: Array) -> pd.DataFrame:
+    """Draw an action at each state (N, n) [rad], and decode it.
+
+    Returns:
+        A row per action: the condition's fields, ``status``, ``iterations`` and ``latency`` [s of processor time].
+    """
+    absolute = make_arm_space(condition.space, arm)
     assert isinstance(absolute, PoseSpace)
-    absolute = replace(absolute, damped=cell.damped)
-    bounds = DeltaBounds(cell.size, TURN * cell.size, TURN * cell.size)
-    space = DeltaSpace(arm, absolute, bounds) if cell.mode == "delta" else absolute
-    rng = np.random.default_rng([MODES.index(cell.mode), SIZES.index(cell.size)])
+    absolute = replace(absolute, damped=condition.damped)
+    bounds = DeltaBounds(condition.size, TURN * condition.size, TURN * condition.size)
+    space = DeltaSpace(arm, absolute, bounds) if condition.mode == "delta" else absolute
+    rng = np.random.default_rng([MODES.index(condition.mode), SIZES.index(condition.size)])
     commander = Commander(space, PERIOD)
-    statuses, iterations, latencies = Counter[str](), [], []
+    rows = []
     for q in states[:WARM_UP]:
         commander.reset(q)
         commander.command(space.encode(q), q)
     for q in states:
-        action = _changed(space, cell, q, rng)
+        action = _changed(space, condition, q, rng)
         commander.reset(q)
         started = time.thread_time()  # not the wall's: other processes do not count
         command = commander.command(action, q)
-        latencies.append(time.thread_time() - started)
-        statuses[command.status] += 1
-        iterations.append(command.iters)
-    return Outcome(cell, statuses, tuple(iterations), tuple(latencies))
+        latency = time.thread_time() - started
+        rows.append({"status": command.status, "iterations": command.iters, "latency": latency})
+    return pd.DataFrame(rows).assign(**vars(condition))
 
 
-def _changed(space: ArmSpace, cell: Cell, q: Vector, rng: np.random.Generator) -> Array:
+def summarise(actions: pd.DataFrame) -> dict[str, Any]:
+    """The study as JSON: every condition, the sizes taken together (``pooled``), and the findings."""
+    report = {
+        "sizes_m": list(SIZES),
+        "turn_rad_per_m": TURN,
+        "period_s": PERIOD,
+        "paper_ms": PAPER_MS,
+        "pooled": _summary(actions, KEYS[:-1]),
+        "cells": _summary(actions, KEYS),
+    }
+    return report | {"findings": findings(report)}
+
+
+def _summary(actions: pd.DataFrame, keys: list[str]) -> list[dict[str, Any]]:
+    """A row per value of the keys."""
+    rows = []
+    for _, part in actions.groupby(keys, sort=False):
+        counts = Counter(part["status"])
+        invalid = len(part) - counts[Status.OK]
+        p50, p99 = (1e3 * np.percentile(part["latency"], [50, 99])).tolist()
+        rows.append(
+            part[keys].iloc[0].to_dict()
+            | {
+                "actions": len(part),
+                "invalid": invalid,
+                "invalid_rate": invalid / len(part),
+                "interval": exact_interval(invalid, len(part)),
+                "causes": {status.value: counts[status] for status in Status if status is not Status.OK},
+                "iterations_p50": float(np.percentile(part["iterations"], 50)),
+                "iterations_p99": float(np.percentile(part["iterations"], 99)),
+                "decode_p50_ms": p50,
+                "decode_p99_ms": p99,
+            }
+        )
+    return rows
+
+
+def _changed(space: ArmSpace, condition: Condition, q: Vector, rng: np.random.Generator) -> Array:
     """An action at a state. The errors of the pose come first, so that they are the same in all spaces."""
     action = space.encode(q)
-    commands = len(action)
-    if cell.mode == "delta":
-        scales = np.array([cell.size] * 3 + [TURN * cell.size] * 4)[:commands]
+    commands = len(action) - 1
+    if condition.mode == "delta":
+        scales = np.array([condition.size] * 3 + [TURN * condition.size] * 4)[:commands]
         errors = rng.uniform(-1.0, 1.0, 7)[:commands]
     else:  # a quaternion's numbers change by half the angle
-        scales = np.array([cell.size] * 3 + [TURN * cell.size / 2] * 4 + [TURN * cell.size])[:commands]
+        scales = np.array([condition.size] * 3 + [TURN * condition.size / 2] * 4 + [TURN * condition.size])[:commands]
         errors = rng.normal(size=8)[:commands]
     action[:commands] += scales * errors
     return action
