@@ -16,7 +16,7 @@ def _verdicts(output: str) -> dict[str, tuple[str, str]]:
 
 
 def _doctor(folder: Path, **environment: str) -> tuple[int, dict[str, tuple[str, str]], str]:
-    command = [sys.executable, "-c", "from er_il.cli import main; main()", "doctor"]
+    command = [sys.executable, "-m", "er_il", "doctor"]
     run = subprocess.run(
         command, cwd=folder, env=os.environ | NOWHERE | environment, capture_output=True, text=True, check=False
     )

@@ -17,14 +17,10 @@ from er_il.policy.configuration import default_config, input_features
 from er_il.policy.training import Training, pretrained
 from er_il.support.errors import DatasetError, PolicyError, UnknownNameError
 
-RECIPE = Recipe.load("reach_cup").resized(3)
 
-
-@pytest.fixture(scope="module")
-def datasets(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("data") / "reach_cup"
-    generate(RECIPE, ["joint", "erj"], out, Progress(disable=True), workers=2)
-    return out
+@pytest.fixture
+def datasets(reach_cup: Path) -> Path:
+    return reach_cup
 
 
 @pytest.fixture
