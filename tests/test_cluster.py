@@ -36,7 +36,9 @@ def patiently(start: Callable[[], Any]) -> Any:
 @pytest.mark.slow
 def test_nothing_is_lost_when_a_process_and_a_machine_die(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))  # the cluster's processes must find these jobs
-    head = {"num_cpus": 0, "include_dashboard": False}
+    # A machine that does not answer is given up after two seconds instead of fifteen.
+    health = {"health_check_initial_delay_ms": 1000, "health_check_period_ms": 500, "health_check_failure_threshold": 4}
+    head = {"num_cpus": 0, "include_dashboard": False, "_system_config": health}
     cluster = patiently(lambda: Cluster(initialize_head=True, head_node_args=head))
     try:
         patiently(lambda: cluster.add_node(num_cpus=1))

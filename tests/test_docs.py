@@ -19,13 +19,13 @@ from foreign import write_bimanual, write_one_arm, write_openarm
 import er_il.cli
 from er_il import Arm
 
-pytestmark = pytest.mark.usefixtures("quiet_logging")
+pytestmark = pytest.mark.usefixtures("quiet_logging", "one_worker")
 
 # What is put behind a command, where it would take long or download something; the last of equal options counts.
 SMALLER = {
     "er-il generate": "--episodes 3",
     "er-il train": "--steps 2",
-    "er-il eval": "--episodes 2",
+    "er-il eval": "--episodes 1",
     "lerobot-train": "--steps=2 --batch_size=2 --num_workers=0 --policy.device=cpu --dataset.video_backend=pyav "
     "--policy.pretrained_backbone_weights=null --policy.dim_model=32 --policy.dim_feedforward=32 --policy.n_heads=2",
     "lerobot-eval": "--eval.n_episodes=1 --eval.batch_size=1 --eval.recording=true",

@@ -11,6 +11,7 @@ def _run(monkeypatch, *arguments):
     main()
 
 
+@pytest.mark.usefixtures("one_worker")
 def test_generate_takes_the_recipe_and_what_is_given_instead(monkeypatch, tmp_path, capsys):
     out = tmp_path / "cups"
     _run(monkeypatch, "generate", "lift_cup", "--episodes", 2, "--seed", 4, "--spaces", "joint,erj", "--out", out)

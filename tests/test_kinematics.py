@@ -112,7 +112,7 @@ def test_out_of_reach_is_said_and_the_arm_stretches_towards_it():
     target = KINEMATICS.fk(PANDA.home)
     target[:3, 3] = [2.0, 0.0, 0.5]
     ik = KINEMATICS.solve(target, PANDA.home)
-    assert ik.status in (Status.UNREACHABLE, Status.LIMIT, Status.NOT_CONVERGED)
+    assert ik.status is Status.UNREACHABLE
     assert ik.pos_err < np.linalg.norm(target[:3, 3] - KINEMATICS.fk(PANDA.home)[:3, 3])
     assert np.all(np.isfinite(ik.q)) and np.all(ik.q >= PANDA.lower) and np.all(ik.q <= PANDA.upper)
 
@@ -124,7 +124,7 @@ def test_a_stretched_arm_stays_finite():
     target[:3, 3] += 0.05 * target[:3, 3] / np.linalg.norm(target[:3, 3])
     for redundancy in ((), (JointAngle(PANDA, ("panda_joint1",)), [0.0])):
         ik = KINEMATICS.solve(target, stretched, *redundancy)
-        assert ik.status is not Status.OK
+        assert ik.status is Status.UNREACHABLE
         assert np.abs(ik.q - stretched).max() < 1.5
         assert ik.pos_err < 0.06
 
@@ -141,7 +141,7 @@ def test_a_limit_in_the_way_is_named():
 def test_other_branch_is_taken_only_if_nearer():
     """Near a fold two solutions lie close together; the decode takes the one nearer the seed."""
     rng = np.random.default_rng(4)
-    arm, checked = PANDA, 0
+    arm, checked, other = PANDA, 0, 0
     for _ in range(400):
         q = random_q(arm, rng)
         singular = np.linalg.svd(KINEMATICS.jacobian(q)[:, 1:], compute_uv=False)[-1]
@@ -151,8 +151,11 @@ def test_other_branch_is_taken_only_if_nearer():
         seed[0] = q[0]
         ik = KINEMATICS.solve(KINEMATICS.fk(q), seed, JointAngle(PANDA, ("panda_joint1",)), [q[0]])
         checked += 1
-        assert ik.status is not Status.OK or np.linalg.norm(ik.q - seed) <= np.linalg.norm(q - seed) + 2e-3
+        other += np.abs(ik.q - q).max() > 0.01
+        assert ik.status is Status.OK
+        assert np.linalg.norm(ik.q - seed) <= np.linalg.norm(q - seed) + 2e-3
     assert checked > 60
+    assert other >= 3
 
 
 def test_wrong_shapes_and_names_are_refused_with_what_was_expected():
@@ -197,15 +200,18 @@ def test_nothing_is_farther_than_the_arm_is_long():
     assert not KINEMATICS.within_reach(np.array([1.2, 0.0, 0.3]))
 
 
-def test_a_limit_that_is_touched_but_not_in_the_way_is_not_named():
+@pytest.mark.parametrize(
+    ("up", "held", "status"),
+    [(0.5, [6], Status.UNREACHABLE), (-0.9, [1, 6], Status.LIMIT)],  # overhead; into the table, which joint 2 limits
+)
+def test_a_limit_that_is_touched_but_not_in_the_way_is_not_named(up, held, status):
     q = PANDA.home.copy()
     q[6] = PANDA.upper[6]  # the hand's own turn
     target = KINEMATICS.fk(q)
-    target[:3, 3] += [0.0, 0.0, -0.9]  # into the table: nothing to do with the hand's turn
+    target[2, 3] += up  # nothing to do with the hand's turn
     ik = KINEMATICS.solve(target, q, JointAngle(PANDA, ("panda_joint1",)), [0.0])
-    assert ik.status is not Status.OK
-    held = (ik.q - PANDA.lower < 1e-4) | (PANDA.upper - ik.q < 1e-4)
-    assert (ik.status is Status.LIMIT) == bool(held[1:6].any())
+    assert ik.status is status
+    assert np.flatnonzero((ik.q - PANDA.lower < 1e-4) | (PANDA.upper - ik.q < 1e-4)).tolist() == held
 
 
 def test_damping_costs_nothing_where_it_is_easy_and_ends_nearer_to_what_cannot_be_met():
@@ -215,12 +221,14 @@ def test_damping_costs_nothing_where_it_is_easy_and_ends_nearer_to_what_cannot_b
         ik = kinematics.solve(kinematics.fk(easy), PANDA.home, JointAngle(PANDA, ("panda_joint1",)), [0.1])
         np.testing.assert_allclose(ik.q, easy, atol=1e-4)
     rng = np.random.default_rng(6)
-    missed = {KINEMATICS: 0.0, undamped: 0.0}
+    missed, met = {KINEMATICS: 0.0, undamped: 0.0}, {KINEMATICS: 0, undamped: 0}
     for _ in range(60):
         q = random_q(PANDA, rng, 0.05)
         target = KINEMATICS.fk(q)
         target[:3, 3] += rng.normal(scale=0.05, size=3)
         for kinematics in missed:
             ik = kinematics.solve(target, q, JointAngle(PANDA, ("panda_joint1",)), [q[0]])
+            met[kinematics] += ik.status is Status.OK
             missed[kinematics] += (ik.pos_err + ik.rot_err) * (ik.status is not Status.OK)
+    assert 50 >= met[KINEMATICS] >= met[undamped] >= 30
     assert missed[KINEMATICS] < 0.9 * missed[undamped]

@@ -7,21 +7,19 @@ import pytest
 from documented import ROOT, documented, run, train_in_process
 from lerobot.policies import PreTrainedPolicy
 from lerobot.policies.diffusion.modeling_diffusion import DiffusionPolicy
-from rich.progress import Progress
 
-from er_il.datasets.recipe import Recipe
-from er_il.datasets.recording import generate
 from er_il.envs.contract import policy_contract
 from er_il.evaluation.rollouts import evaluate
 from er_il.policy.training import pretrained
 
 
 @pytest.mark.slow
-def test_diffusion_trains_on_an_er_dataset_and_rolls_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_diffusion_trains_on_an_er_dataset_and_rolls_out(
+    reach_cup: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     monkeypatch.chdir(tmp_path)
     Path("configs").symlink_to(ROOT / "configs")
-    data = Path("datasets/reach_cup")
-    generate(Recipe.load("reach_cup").resized(2), ["erj"], data, Progress(disable=True), workers=2)
+    Path("datasets").symlink_to(reach_cup.parent)
     train_in_process(monkeypatch, "--batch_size=4", "--policy.num_inference_steps=2")
     run("er-il", *documented("docs/policies.md", "er-il train"), "--steps", "2")
     policy = pretrained(Path("policies/reach_cup/erj_diffusion"))

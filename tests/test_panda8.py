@@ -87,6 +87,7 @@ def test_a_rollout_takes_the_policys_arm(tmp_path: Path, decoder: str) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("one_worker")
 def test_the_pages_commands_make_a_policy_of_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     train_in_process(monkeypatch, "--batch_size=2", "--policy.dim_model=32", "--policy.dim_feedforward=32")

@@ -187,7 +187,7 @@ def test_an_unreachable_pose_is_said_and_stays_within_limits(kind):
     action = space.encode(PANDA.home)
     action[:3] = [1.5, 0.0, 0.3]
     decoded = space.decode(action, PANDA.home)
-    assert decoded.status in (Status.UNREACHABLE, Status.LIMIT, Status.NOT_CONVERGED)
+    assert decoded.status is Status.UNREACHABLE
     assert np.all(decoded.q >= PANDA.lower) and np.all(decoded.q <= PANDA.upper)
     assert decoded.pos_err > 0.1
 

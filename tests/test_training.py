@@ -8,6 +8,7 @@ import torch
 from lerobot.scripts import lerobot_edit_dataset, lerobot_eval, lerobot_train
 from rich.progress import Progress
 
+import er_il.policy.in_memory
 from er_il import cli
 from er_il.datasets.recipe import Recipe
 from er_il.datasets.recording import generate
@@ -16,14 +17,10 @@ from er_il.policy.configuration import default_config, input_features
 from er_il.policy.training import Training, pretrained
 from er_il.support.errors import DatasetError, PolicyError, UnknownNameError
 
-RECIPE = Recipe.load("reach_cup").resized(3)
 
-
-@pytest.fixture(scope="module")
-def datasets(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("data") / "reach_cup"
-    generate(RECIPE, ["joint", "erj"], out, Progress(disable=True), workers=2)
-    return out
+@pytest.fixture
+def datasets(reach_cup: Path) -> Path:
+    return reach_cup
 
 
 @pytest.fixture
@@ -126,7 +123,9 @@ def test_from_images_to_a_rollout(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     stock, in_memory = (training(tmp_path, tmp_path / name, **changes) for name in ("stock", "in_memory"))
     stock.prepare()
     run(monkeypatch, lerobot_train.main, *stock.command[1:])
-    assert in_memory.run() == 0
+    in_memory.prepare()
+    monkeypatch.setattr(lerobot_train, "make_train_eval_datasets", lerobot_train.make_train_eval_datasets)  # to undo
+    run(monkeypatch, er_il.policy.in_memory.main, *in_memory.command[1:])  # in its own process it runs above
     weights = [each.policy / "model.safetensors" for each in (stock, in_memory)]
     assert weights[0].read_bytes() == weights[1].read_bytes()
     seen = json.loads((stock.policy / "config.json").read_text())["input_features"]

@@ -5,12 +5,10 @@ import os
 import sys
 from collections.abc import Callable
 
-import tyro
-
 from er_il.support.errors import ErIlError
 
-# Command -> module under er_il.cli that holds a function of the command's name. Their heavy
-# imports (torch, MuJoCo, Rerun) wait inside the functions, so that help is instant.
+# Command -> module under er_il.cli that holds a function of the command's name. The modules import the standard
+# library and tyro only; NumPy, torch, MuJoCo and the like wait inside the functions, so that help is instant.
 COMMANDS: dict[str, str] = {
     "advise": "advise",
     "attach": "attach",
@@ -35,6 +33,8 @@ INTERRUPTED = 130
 def main() -> None:
     """Run the command line; user mistakes print one line and exit with code 2."""
     try:
+        import tyro  # here, where Ctrl-C is answered
+
         tyro.extras.subcommand_cli_from_dict(
             {name: _command(name, module) for name, module in COMMANDS.items()},
             prog="er-il",
