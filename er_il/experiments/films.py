@@ -72,7 +72,7 @@ def _write_strip(rows: Sequence[Row], path: Path) -> None:
 
 
 def _outcome(film: Film) -> tuple[str, bool]:
-    """What came of a filmed rollout, for people, and if that is success."""
+    """Outcome of a filmed rollout for people, and whether it is success."""
     outcome = Trace.load(film.path).outcome
     return outcome.replace("_", " "), outcome == SUCCESS
 

@@ -37,17 +37,16 @@ _LOGGED_STEP = re.compile(r"step:([\d.]+)(K?)")  # as lerobot-train logs it
 
 
 @dataclass(frozen=True)
-class Demonstrate:
+class Demonstrate(FileResult):
     """Record the demonstrations of a grid's task, once, and encode them in each space."""
 
     task: str
     grid: Grid = field(hash=False)
     spaces: tuple[str, ...]
-    out: Path  # folder of the datasets, one a space
+    path: Path  # folder of the datasets, one a space
     workers: int  # processes that record
 
     stage = "Record"
-    progress = 0
     needs = ()
 
     @property
@@ -59,17 +58,13 @@ class Demonstrate:
         return self.grid.recipe(self.task).episodes
 
     @property
-    def log(self) -> Path:
-        return self.out.with_name(f"{self.out.name}.log")
-
-    @property
     def done(self) -> bool:
-        return all((self.out / space).exists() for space in self.spaces)
+        return all((self.path / space).exists() for space in self.spaces)
 
     def run(self) -> None:
         """Record and encode what is missing."""
         with Progress(disable=True) as progress:
-            generate(self.grid.recipe(self.task), self.spaces, self.out, progress, self.workers)
+            generate(self.grid.recipe(self.task), self.spaces, self.path, progress, self.workers)
 
 
 @dataclass(frozen=True)

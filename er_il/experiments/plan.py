@@ -55,7 +55,7 @@ class Plan:
 
     def _claim(self) -> None:
         for task, demonstrate in self._demonstrations.items():
-            for dataset in (demonstrate.out / space for space in demonstrate.spaces):
+            for dataset in (demonstrate.path / space for space in demonstrate.spaces):
                 if dataset.exists() and (
                     what := self.grid.recipe(task).differences(DatasetRecord.read(dataset).recipe)
                 ):
@@ -93,7 +93,7 @@ class Plan:
         return Train(
             task=cell.task,
             space=space,
-            dataset=demonstrate.out / space,
+            dataset=demonstrate.path / space,
             path=self.out / "policies" / cell.task / space / f"{_variant(cell, steps, seed)}.json",
             steps=steps,
             seed=seed,

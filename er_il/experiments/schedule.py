@@ -60,7 +60,7 @@ class Job(Protocol):
 
 
 class FileResult:
-    """Common part of jobs whose result is one file."""
+    """Common part of jobs whose result is one file or folder."""
 
     size = 1
     progress = 0

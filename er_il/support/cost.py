@@ -1,4 +1,4 @@
-"""What work costs: time on the clock and on processors."""
+"""Cost of work: time on the clock and on processors."""
 
 import os
 import time
