@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import mujoco
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from er_il.kinematics.solver import Status, kinematics_of
 from er_il.support.errors import PlanError
-from sim_tasks.leader.hand import hand_pose
 from sim_tasks.leader.leader import Leader
 from sim_tasks.leader.motion import Keyframe, Segment, joint_angles, plan_path
 from sim_tasks.tasks.push_button_elbow import BUTTON, PushButtonElbow
@@ -31,8 +31,8 @@ class PushButtonLeader(Leader[PushButtonElbow]):
         x, y = world.object_pose(BUTTON)[:2]
         hand = np.array(HAND) + FOLLOW * np.array([x - world.centre[0], y - world.centre[1], 0.0])
         hand[2] += world.shoulder_offset
-        swing = Keyframe(hand_pose(hand + ASIDE + self._draw_via(rng), PITCH), RAISED, lean=LEAN)
-        pressing = hand_pose(hand, PITCH)
+        swing = Keyframe(_hand_pose(hand + ASIDE + self._draw_via(rng)), RAISED, lean=LEAN)
+        pressing = _hand_pose(hand)
         press = Keyframe(pressing, self._pressing_elbow(pressing), straight=True, lean=LEAN)
         # The elbow is to touch the button, and nothing else is near.
         path = plan_path(world.arm, world.joint_positions, [swing, press], is_free=lambda _: True)
@@ -62,3 +62,15 @@ class PushButtonLeader(Leader[PushButtonElbow]):
                 return angle
         x, y = world.object_pose(BUTTON)[:2]
         raise PlanError(f"The elbow does not get down to the button at ({x:.2f}, {y:.2f}).")
+
+
+def _hand_pose(position: np.ndarray) -> np.ndarray:
+    """T_base_ee (4, 4) of a hand at ``position`` (3,) [m] that points forward and down.
+
+    The pose is that of :func:`sim_tasks.leader.hand.hand_pose` but for the last bits, on which the published
+    demonstrations depend.
+    """
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_euler("xy", [np.pi, PITCH - np.pi / 2]).as_matrix()
+    T[:3, 3] = position
+    return T
