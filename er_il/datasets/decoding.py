@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from er_il.datasets.dataset import Dataset
 from er_il.kinematics.solver import Status
 from er_il.spaces.layout import Layout
-from er_il.spaces.pose import PoseSpace
 from er_il.spaces.spec import ACTION
 from er_il.support.workers import LocalExecutor
 
@@ -64,8 +63,7 @@ def decode_episode(layout: Layout, episode: EncodedEpisode) -> DecodedEpisode:
         for p, (part, arm) in enumerate(zip(layout.parts, decoded.parts, strict=True)):
             result.status[t, p] = arm.status
             result.position_error[t, p], result.rotation_error[t, p] = arm.pos_err, arm.rot_err
-            if isinstance(part.space, PoseSpace):
-                result.conditioning[t, p] = part.space.conditioning(layout.angles(part, last))
+            result.conditioning[t, p] = part.space.conditioning(layout.angles(part, last))
     return result
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from er_il.datasets.disturbance import disturbances
 from er_il.datasets.recipe import Recipe
+from er_il.envs.protocol import demonstrable_env
 from er_il.envs.tasks import task_id
 from er_il.support.atomic_files import write_arrays
 from er_il.support.counts import tally
@@ -79,9 +80,8 @@ def record_demo(world: gymnasium.Env[Any, Any], seed: int, disturbance: float = 
     """
     observation, info = world.reset(seed=seed)
     rows: list[tuple[Any, Floats]] = []
-    unwrapped: Any = world.unwrapped
     try:
-        script = np.array(list(unwrapped.leader(seed)))
+        script = np.array(list(demonstrable_env(world).leader(seed)))
         rng = np.random.default_rng([seed, _PUSHES])
         pushes = disturbances(script, disturbance, 1 / world.metadata["render_fps"], rng)
         for target, push in zip(script, pushes, strict=True):

@@ -25,6 +25,7 @@ from er_il.datasets.normalisation import bound_rotation_deviation, normalise_obs
 from er_il.datasets.recipe import Recipe
 from er_il.datasets.record import DatasetRecord
 from er_il.datasets.schema import DEMO_SEED, ENVIRONMENT_STATE, IMAGES, LEADER_JOINTS, STATE, features
+from er_il.envs.protocol import arm_env
 from er_il.spaces.base import ArmSpace
 from er_il.spaces.layout import Layout
 from er_il.spaces.registry import check_space, make_arm_space
@@ -120,16 +121,16 @@ class _Writer:
         self._recipe, self._space = recipe, space
         os.environ.setdefault("SVT_LOG", "1")  # errors only: the encoders would bury the progress bar
         av.logging.set_libav_level(av.logging.ERROR)
-        unwrapped: Any = world.unwrapped
-        self._description: str = unwrapped.task_description
+        inner = arm_env(world)
+        self._description: str = inner.task_description
         self._dataset = LeRobotDataset.create(
             repo_id=f"er_il/{recipe.task}",
             root=root,
             fps=world.metadata["render_fps"],
             features=features(
                 space,
-                unwrapped.state_names,
-                unwrapped.environment_state_names,
+                inner.state_names,
+                inner.environment_state_names,
                 recipe.cameras,
                 recipe.image_size,
             ),

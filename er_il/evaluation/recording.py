@@ -36,7 +36,7 @@ def record_rollout(
     with closing(config.make()) as env, one_thread():
         check_policy(policy, env.space)
         actor = Actor.load(policy, config)
-        world: Any = env.unwrapped
+        world = env.world
         observation, info = env.reset(seed=seed, options={NEW_ROLLOUT_OPTION: True})
         actor.reset(seed)
         done = False

@@ -110,7 +110,6 @@ def replay(datasets: Sequence[Path], workers: int, advance: Callable[[Path, str,
 def replay_demo(world: ActionSpaceEnv, demo: RecordedEpisode) -> Replayed:
     """Execute a demo's actions in the world it was recorded in."""
     world.reset(seed=demo.seed)
-    unwrapped: Any = world.unwrapped
     grace = round(GRACE * world.metadata["render_fps"])
     actions = np.concatenate([demo.actions, np.repeat(demo.actions[-1:], grace, axis=0)])
     joints = demo.state[:, : world.space.arm.dof]
@@ -119,7 +118,7 @@ def replay_demo(world: ActionSpaceEnv, demo: RecordedEpisode) -> Replayed:
     info: dict[str, Any] = {}
     for step, action in enumerate(actions):
         if step < len(joints):
-            deviation = max(deviation, float(np.max(np.abs(unwrapped.joint_positions - joints[step]))))
+            deviation = max(deviation, float(np.max(np.abs(world.world.joint_positions - joints[step]))))
         _, _, terminated, truncated, info = world.step(action)
         statuses[info["decode_status"]] += 1
         joint_step = max(joint_step, info["joint_step"])

@@ -55,10 +55,9 @@ class Plan:
 
     def _claim(self) -> None:
         for task, demonstrate in self._demonstrations.items():
+            recipe = self.grid.recipe(task)
             for dataset in (demonstrate.path / space for space in demonstrate.spaces):
-                if dataset.exists() and (
-                    what := self.grid.recipe(task).differences(DatasetRecord.read(dataset).recipe)
-                ):
+                if dataset.exists() and (what := recipe.differences(DatasetRecord.read(dataset).recipe)):
                     raise ErIlError(
                         f"{dataset} holds another recipe's demonstrations; asked for is {what}. "
                         f"Choose another --out, or delete what {self.out} holds of {task}."

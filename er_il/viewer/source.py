@@ -8,6 +8,7 @@ from typing import Any
 import gymnasium
 
 from er_il.datasets.record import RECORD, DatasetRecord
+from er_il.envs.protocol import arm_env
 from er_il.envs.tasks import task_id, task_names
 from er_il.evaluation.trace import SUFFIX, Trace
 from er_il.support.errors import DatasetError
@@ -57,7 +58,6 @@ def shapes_of(trace: Trace, environment: Mapping[str, Any] | None = None) -> lis
     env = gymnasium.make(task_id(trace.task), **(environment or {"arm": trace.spec["arm"]["name"]}))
     try:
         env.reset(seed=trace.seed)
-        world: Any = env.unwrapped
-        return list(world.scene_geometry())
+        return list(arm_env(env).scene_geometry())
     finally:
         env.close()
