@@ -4,8 +4,8 @@ from foreign import ARMS, NAMES
 from er_il import Arm
 from er_il.datasets.card import dimension_meaning
 from er_il.datasets.wiring import read_wirings, wire
-from er_il.spaces import make_action_space
 from er_il.spaces.layout import Layout
+from er_il.spaces.registry import make_arm_space
 from er_il.spaces.spec import ACTION
 
 PANDA = Arm.preset("panda")
@@ -31,7 +31,7 @@ MOVES = [
     ],
 )
 def test_every_dimension_is_described(kind, rotation, meanings):
-    layout = Layout.of_space(make_action_space(kind, PANDA, rotation=rotation))
+    layout = Layout.of_space(make_arm_space(kind, PANDA, rotation=rotation))
     assert [dimension_meaning(layout, name) for name in layout.encoded_names] == [*meanings, "as in the source"]
 
 

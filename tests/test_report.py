@@ -22,7 +22,7 @@ from er_il.report.style import BAD, GOOD, LOOKS, OTHERS, looks_of
 from er_il.report.tables import compact_table, markdown_table, success_table, terminal_table
 from er_il.report.validity import validity_figure
 from er_il.report.verification import verification_figure, verification_notes
-from er_il.spaces import make_action_space
+from er_il.spaces.action_space import make_action_space
 from er_il.spaces.layout import Layout
 
 RESULTS = Path(__file__).resolve().parents[1] / "results"

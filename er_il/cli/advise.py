@@ -70,7 +70,6 @@ def advise(
 
 def _arms(source: str, robot: ArmOptions, episodes: int) -> "dict[str, tuple[Arm, Demos]]":
     """Each arm by its label, and its demonstrations."""
-    from dataclasses import replace
 
     from er_il.arms.presets import PRESETS
     from er_il.support.errors import DatasetError
@@ -78,7 +77,7 @@ def _arms(source: str, robot: ArmOptions, episodes: int) -> "dict[str, tuple[Arm
     if source in PRESETS or (Path(source).is_file() and Path(source).suffix in (".urdf", ".xml")):
         if robot.arm or robot.arms:
             raise DatasetError(f"{source} is an arm: --arm and --arms are for datasets that do not know theirs.")
-        return {"": (replace(robot.wiring(), arm=source).build_arm(), {})}
+        return {"": (robot.wiring().model_copy(update={"arm": source}).build_arm(), {})}
     wirings = robot.wirings()
     if Path(source).suffix in (".urdf", ".xml"):
         raise DatasetError(f"There is no file {source}. Presets are {', '.join(sorted(PRESETS))}.")
