@@ -13,7 +13,7 @@ from er_il.arms.urdf import example_robot_data
 
 @dataclass(frozen=True)
 class Preset:
-    """What :meth:`er_il.arms.arm.Arm.from_urdf` needs to know of an arm."""
+    """Arguments of :meth:`er_il.arms.arm.Arm.from_urdf` for a known arm."""
 
     urdf: Callable[[], Path]
     base_frame: str

@@ -15,7 +15,7 @@ Numbers = Annotated[tuple[float, ...], arg(metavar="X ...")]
 
 @dataclass(frozen=True)
 class ArmOptions:
-    """Which arm it is, and which dimensions are its joints."""
+    """The arm, and the dimensions that are its joints."""
 
     arm: str = ""
     """Preset (panda, panda8, xarm7, gen3), or path of a URDF."""

@@ -142,13 +142,13 @@ def collect(recipe: Recipe, folder: Path, workers: int) -> Iterator[tuple[int, s
 
 
 def demo_path(folder: Path, seed: int) -> Path:
-    """Where :func:`collect` stores a demo."""
+    """Path at which :func:`collect` stores a demo."""
     return folder / f"{seed}.npz"
 
 
 @dataclass
 class _Recorder:
-    """What a worker process keeps between demos."""
+    """State of a worker process between demos."""
 
     recipe: Recipe
     folder: Path

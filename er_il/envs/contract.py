@@ -29,7 +29,7 @@ DECODE_POLICY_ACTION = "er_il_decode_policy_action"
 
 @dataclass(frozen=True)
 class Contract:
-    """What a policy's actions mean."""
+    """The meaning of a policy's actions."""
 
     space: str
     arm: str

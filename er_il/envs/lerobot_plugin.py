@@ -108,7 +108,7 @@ def _make(gym_id: str, gym_kwargs: dict[str, Any], decoder: Decoder, rotation: s
 
 @dataclass(frozen=True)
 class _Probe:
-    """What LeRobot has to know of an environment before it makes any."""
+    """Properties of an environment that LeRobot needs before it makes any."""
 
     fps: int
     features: dict[str, PolicyFeature]  # of the observations

@@ -20,7 +20,7 @@ TIME_WEIGHT = 0.02
 
 @dataclass(frozen=True)
 class ElbowReference:
-    """Where demonstrations had the elbow, by where the hand was and how long the episode had lasted."""
+    """Elbow positions of demonstrations, indexed by end-effector position and time."""
 
     arm: Arm
     elbow: str  # link of the elbow

@@ -155,7 +155,7 @@ def write_report(cells: Sequence[ReplayCell], meta: dict[str, Any], path: Path) 
 
 @dataclass(frozen=True)
 class _Play:
-    """Which world, and which decoder."""
+    """A world and a decoder."""
 
     recipe: Recipe
     decoder: str

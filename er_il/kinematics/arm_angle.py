@@ -75,7 +75,7 @@ class ElbowCircle:
         return self.centre + self.radius * (self.top * math.cos(angle) + self.side * math.sin(angle))
 
     def slopes(self) -> tuple[Array, Array]:
-        """How r_E phi changes with the elbow's and the wrist's position (3,), r_E and the shoulder held.
+        """Derivatives (3,) of r_E phi by the elbow's and by the wrist's position, r_E and the shoulder held.
 
         Lengths along the circle, not angles: these stay finite where the circle shrinks to a point.
         """

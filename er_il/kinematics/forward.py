@@ -74,7 +74,7 @@ class ForwardKinematics:
         return np.concatenate([T_base_ee[:3, 3] - T[:3, 3], pin.log3(T_base_ee[:3, :3] @ T[:3, :3].T)])
 
     def within_reach(self, position: Vector) -> bool:
-        """Whether a position (3,) [m] is no farther from the first joint than the stretched arm is long.
+        """True if a position (3,) [m] is no farther from the first joint than the stretched arm is long.
 
         Farther than that the end effector never gets, whatever the joint limits; nearer it may not either.
         """
@@ -83,7 +83,7 @@ class ForwardKinematics:
 
     @cached_property
     def twisting(self) -> NDArray[np.bool_]:
-        """Which joints (n,) twist the links that they join; the others bend the arm.
+        """Mask (n,) of the joints that twist the links they connect; the others bend the arm.
 
         A joint twists if the way from the joint before and to the one after (the base and the end
         effector at the ends) goes along its axis rather than across, all joints at zero. Joints at

@@ -64,7 +64,7 @@ class Redundancy(ABC):
         return self
 
     def details(self) -> dict[str, Any]:
-        """What a specification holds of the redundancy, as JSON."""
+        """The redundancy's part of a specification, as JSON."""
         return {}
 
     def restored(self, spec: Mapping[str, Any]) -> Self:

@@ -43,7 +43,7 @@ FOLD_STEP = 1e-4  # [rad] of the finite difference across the fold
 
 @dataclass(frozen=True, eq=False)
 class Goal:
-    """What a solution must meet."""
+    """A pose and, if commanded, redundancy values to reach."""
 
     T_base_ee: Array  # (4, 4)
     redundancy: Redundancy | None = None
@@ -61,7 +61,7 @@ class Goal:
 
 
 class Miss(NamedTuple):
-    """How far joint angles are from a goal."""
+    """Errors of joint angles with respect to a goal."""
 
     position: float  # [m]
     rotation: float  # [rad]
@@ -72,7 +72,7 @@ class Miss(NamedTuple):
 
 @dataclass(frozen=True)
 class Attempt:
-    """Where a run of iterations ended."""
+    """Result of a run of iterations."""
 
     q: Vector  # (n,) [rad]
     miss: Miss

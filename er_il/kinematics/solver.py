@@ -17,7 +17,7 @@ FAR = 0.3  # [rad] a solution this far from the seed is looked at with suspicion
 
 
 class Status(StrEnum):
-    """What became of a decoded action."""
+    """Outcome of decoding an action."""
 
     OK = "ok"
     INVALID = "invalid"  # not finite, or no rotation

@@ -30,7 +30,7 @@ DECODE_ROBOT_ACTION = "er_il_decode_robot_action"
 
 @dataclass(kw_only=True)
 class _Decoding:
-    """What both steps are told.
+    """Common attributes of both steps.
 
     Attributes:
         spec: The specification of the actions, from the dataset's ``features["action"]["info"]["er_il"]``.
@@ -58,7 +58,7 @@ class _Decoding:
 
 
 def measured_names(layout: Layout) -> dict[str, str]:
-    """Where a layout's dimensions are measured: dimension -> its name in the state.
+    """Names of a layout's dimensions in the state: dimension -> name.
 
     Arms say so themselves. Anything else is looked for under its own name.
     """

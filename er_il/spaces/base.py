@@ -41,7 +41,7 @@ class ArmSpace(ABC):
 
     @abstractmethod
     def _details(self) -> dict[str, Any]:
-        """What the specification holds beyond the kind, the arm and the names."""
+        """The specification beyond the kind, the arm and the names."""
 
     @property
     def dim(self) -> int:

@@ -43,7 +43,7 @@ class Motors:
 
     @property
     def plain(self) -> bool:
-        """Whether values are the URDF's angles as they are."""
+        """True if values are the URDF's angles without conversion."""
         return self.units == "rad" and all(s == 1 for s in self.signs) and not any(self.offsets)
 
     def angles(self, values: ArrayLike) -> Array:

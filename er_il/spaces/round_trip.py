@@ -1,4 +1,4 @@
-"""The leading property, sampled: decode(encode(q), seed near q) gives q back, or shows why not."""
+"""Round trips: decode(encode(q), seed near q) returns q, or the cause of the miss is determined."""
 
 from dataclasses import dataclass
 
@@ -36,7 +36,7 @@ class RoundTrip:
 
     @property
     def cause(self) -> str:
-        """Why the configuration did not come back, one of ``CAUSES``; "" if it did."""
+        """Cause of a miss, one of ``CAUSES``; "" if the configuration came back."""
         if self.exact:
             return ""
         if self.at_limit or self.decoded.status is Status.LIMIT:

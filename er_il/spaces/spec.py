@@ -1,4 +1,4 @@
-"""Where the specification of an action space stands among a LeRobot dataset's features."""
+"""Location of an action space's specification among the features of a LeRobot dataset."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -1,1 +1,1 @@
-"""What every room uses: errors, files, processes, provenance."""
+"""Errors, files, processes and provenance, used by every room."""

@@ -1,9 +1,9 @@
-"""Whether somebody can see a window."""
+"""Availability of a display."""
 
 import os
 import sys
 
 
 def has_display() -> bool:
-    """Whether there is a screen to open a window on."""
+    """True if a display is available."""
     return not sys.platform.startswith("linux") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

@@ -1,4 +1,4 @@
-"""What this machine has for er_il, what it lacks, and how to get it."""
+"""Checks of this machine: requirements of er_il, and remedies for missing ones."""
 
 import importlib.metadata
 import os
@@ -140,7 +140,7 @@ def _succeeds(code: str, environment: Mapping[str, str] | None = None) -> bool:
 
 
 def _output(code: str, environment: Mapping[str, str] | None = None) -> str | None:
-    """What a fresh Python prints that runs the code; None if it fails or takes too long."""
+    """Output of a fresh Python that runs the code; None if it fails or takes too long."""
     try:
         probe = subprocess.run(
             [sys.executable, "-c", code],

@@ -1,4 +1,4 @@
-"""Where the recipes, configurations and cards are: in the checkout, or packed into the wheel."""
+"""Locations of recipes, configurations and cards: in the checkout, or packed into the wheel."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What a world looks like, so that a viewer can draw it without the simulator that runs it.
+"""Shapes of a world, by which a viewer draws it without its simulator.
 
 An environment describes itself by ``env.unwrapped.scene_geometry() -> Sequence[Shape]``, valid since
 its last reset. An object ``cup`` that moves is followed through the environment state, whose names

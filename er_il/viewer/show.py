@@ -1,4 +1,4 @@
-"""Where a recording goes: a file, a viewer on this screen, or a browser anywhere."""
+"""Destinations of a recording: a file, a viewer on this screen, or a browser."""
 
 import socket
 from collections.abc import Iterator, Sequence

@@ -1,4 +1,4 @@
-"""What LeRobot asks of every device and a simulated one does not need."""
+"""Calibration interface of LeRobot's devices, for simulated ones, which need none."""
 
 
 class NeedsNoCalibration:
@@ -6,7 +6,7 @@ class NeedsNoCalibration:
 
     @property
     def is_calibrated(self) -> bool:
-        """Whether it is ready to be moved."""
+        """True: a simulated device is always calibrated."""
         return True
 
     def calibrate(self) -> None:

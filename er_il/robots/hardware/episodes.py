@@ -1,4 +1,4 @@
-"""How a device learns that LeRobot begins another episode: it listens to what LeRobot announces."""
+"""Detection of episode starts: devices listen to LeRobot's announcements."""
 
 import logging
 
