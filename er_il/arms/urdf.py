@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
 
+from er_il.support.atomic_files import write_atomically
 from er_il.support.errors import ArmError
 
 PACKAGE = "package://"
@@ -76,10 +77,7 @@ def generated_urdf(text: str, name: str) -> Path:
     folder = Path(tempfile.gettempdir()) / f"er_il-{hashlib.sha256(text.encode()).hexdigest()[:12]}"
     path = folder / Path(name).name
     if not path.exists():
-        folder.mkdir(exist_ok=True)
-        partial = folder / f"{path.name}.{os.getpid()}.partial"
-        partial.write_text(text)
-        partial.replace(path)  # whole under its name, whichever process is first
+        write_atomically(path, lambda partial: partial.write_text(text))
     return path
 
 
