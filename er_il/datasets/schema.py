@@ -27,13 +27,13 @@ def features(
     image_size: int,
 ) -> dict[str, Feature]:
     """Describe the columns of a dataset of demos, for ``LeRobotDataset.create``."""
-    joint_names = tuple(f"{joint}.pos" for joint in space.arm.joints)
+    layout = Layout.of_space(space)
     image = {"dtype": "video", "shape": (image_size, image_size, 3), "names": ["height", "width", "channels"]}
     return {
-        ACTION: action_feature(Layout.of_space(space)),
+        ACTION: action_feature(layout),
         STATE: _vector(state_names),
         ENVIRONMENT_STATE: _vector(environment_state_names),
-        LEADER_JOINTS: _vector((*joint_names, "gripper")),
+        LEADER_JOINTS: _vector(layout.names),
         DEMO_SEED: {"dtype": "int64", "shape": (1,), "names": None},
         **{IMAGES + camera: dict(image) for camera in cameras},
     }

@@ -11,11 +11,10 @@ from numpy.typing import ArrayLike
 from er_il.arms.arm import Arm, Vector
 from er_il.kinematics.rotation import Quaternion
 from er_il.kinematics.solver import IkResult, Kinematics
-from er_il.spaces.base import ArmSpace, Array
+from er_il.spaces.base import ArmSpace, Array, checked_action
 from er_il.spaces.delta import DeltaBounds
 from er_il.spaces.layout import Layout
 from er_il.spaces.registry import arm_space_from_spec, make_arm_space
-from er_il.support.errors import ShapeError
 
 
 @dataclass(frozen=True)
@@ -92,10 +91,7 @@ class ActionSpace:
             current: (n,) [rad] the last command, which a delta counts from; the seed if omitted.
                 Absolute spaces do not need it.
         """
-        command = np.asarray(action, dtype=np.float64)
-        if command.shape != (self.dim,):
-            raise ShapeError(f"A {self.kind} action", command.shape, f"({self.dim},): {', '.join(self.names)}")
-        (own,), (opening,) = self.layout.split_encoded(command)
+        (own,), (opening,) = self.layout.split_encoded(checked_action(action, self.kind, self.names))
         if not np.isfinite(opening):  # a number that is none makes the whole action mean nothing
             own, opening = np.full(len(own), np.nan), 1.0
         ik = self.arm_space.decode(own, seed, current)

@@ -99,9 +99,7 @@ class ArmSpace(ABC):
             current: (n,) [rad] the last command, which a delta counts from; the seed if omitted.
                 Absolute spaces do not need it.
         """
-        command = np.asarray(action, dtype=np.float64)
-        if command.shape != (self.dim,):
-            raise ShapeError(f"A {self.kind} action", command.shape, f"({self.dim},): {', '.join(self.names)}")
+        command = checked_action(action, self.kind, self.names)
         start, last = self._within_limits("The seed", seed), seed if current is None else current
         if not np.all(np.isfinite(command)):
             return IkResult(start, Status.INVALID)
@@ -142,3 +140,15 @@ class ArmSpace(ABC):
         if given.shape != (self.arm.dof,):
             raise ShapeError(what, given.shape, f"({self.arm.dof},)")
         return np.clip(given, self.arm.lower, self.arm.upper)
+
+
+def checked_action(action: ArrayLike, kind: str, names: tuple[str, ...]) -> Vector:
+    """Return an action (len(names),) as an array.
+
+    Raises:
+        ShapeError: it has another length.
+    """
+    command = np.asarray(action, dtype=np.float64)
+    if command.shape != (len(names),):
+        raise ShapeError(f"A {kind} action", command.shape, f"({len(names)},): {', '.join(names)}")
+    return command
