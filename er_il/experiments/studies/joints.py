@@ -1,13 +1,14 @@
 """The study of ERJ's joints: every choice measured over the workspace and along demonstrations."""
 
+import itertools
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
 from er_il.arms.arm import Arm
-from er_il.datasets.joint_path import JointPath
+from er_il.datasets.joint_paths import JointPath
+from er_il.kinematics.redundancy import JointAngle
 from er_il.kinematics.solver import kinematics_of
 from er_il.report.joints import notes
 from er_il.spaces.joint_choice import (
@@ -20,8 +21,8 @@ from er_il.spaces.joint_choice import (
     choices,
     over_workspace,
     ranked,
-    sensitivities,
-    stretches,
+    sensitivity,
+    singular_intervals,
 )
 from er_il.spaces.round_trip import EXACT, SINGULAR
 from er_il.support.workers import run_jobs
@@ -44,17 +45,6 @@ SETTINGS = {
 }
 
 
-@dataclass(frozen=True)
-class SingularInterval:
-    """Consecutive steps of a demonstration near a singularity of the recommended choice."""
-
-    demos: str
-    episode: int
-    first: int
-    last: int
-    smallest: float  # singular value
-
-
 def study_joints(arm: Arm, demos: Demos, workers: int, advance: Callable[[int, int], object]) -> dict[str, Any]:
     """Measure every choice of n-6 joints; return everything as JSON.
 
@@ -69,22 +59,13 @@ def study_joints(arm: Arm, demos: Demos, workers: int, advance: Callable[[int, i
     """
     every = choices(arm)
     q = np.random.default_rng(WORKSPACE_SEED).uniform(arm.lower, arm.upper, (WORKSPACE, arm.dof))
-    paths = {name: [path.commanded for path in of_set] for name, of_set in demos.items()}
-    over = sensitivities(arm, q)
-    along = {name: [sensitivities(arm, path) for path in of_set] for name, of_set in paths.items()}
-    jobs = [(over_workspace, arm, choice, q, over[choice]) for choice in every]
-    for name, of_set in paths.items():
-        jobs += [(along_demos, arm, choice, of_set, [each[choice] for each in along[name]]) for choice in every]
+    paths = [[path.commanded for path in of_set] for of_set in demos.values()]
+    jobs = [(over_workspace, arm, choice, q) for choice in every]
+    jobs += [(along_demos, arm, choice, of_set) for of_set in paths for choice in every]
     measured = run_jobs(jobs, workers if len(jobs) > FEW_JOBS else 1, advance)
-    sets = [dict(zip(every, measured[i : i + len(every)], strict=True)) for i in range(0, len(measured), len(every))]
-    workspace, of_demos = sets[0], dict(zip(demos, sets[1:], strict=True))
-    ranking = ranked(list(of_demos.values()) or [workspace])
-    near = [
-        SingularInterval(name, path.episode, *interval)
-        for name, of_set in demos.items()
-        for path, sensitivity in zip(of_set, along[name], strict=True)
-        for interval in stretches(sensitivity[ranking[0]].smallest)
-    ]
+    workspace, *of_demos = itertools.batched(measured, len(every))
+    ranking = ranked(of_demos or [workspace])
+    recommended = JointAngle(arm, ranking[0])
     twisting = kinematics_of(arm).twisting.tolist()
     report = {
         "arm": arm.name,
@@ -93,9 +74,14 @@ def study_joints(arm: Arm, demos: Demos, workers: int, advance: Callable[[int, i
         "default": list(arm.redundant),
         "recommended": list(ranking[0]),
         "ranking": [list(choice) for choice in ranking],
-        "workspace": [asdict(fitness) for fitness in workspace.values()],
-        "demos": {name: [asdict(each) for each in of_set.values()] for name, of_set in of_demos.items()},
-        "near_singularity": [asdict(interval) for interval in near],
+        "workspace": [vars(fitness) for fitness in workspace],
+        "demos": {name: [vars(each) for each in of_set] for name, of_set in zip(demos, of_demos, strict=True)},
+        "near_singularity": [
+            {"demos": name, "episode": path.episode} | vars(interval)
+            for name, of_set in demos.items()
+            for path in of_set
+            for interval in singular_intervals(sensitivity(recommended, path.commanded).smallest)
+        ],
         "settings": SETTINGS,
     }
     return report | {"notes": notes(report)}

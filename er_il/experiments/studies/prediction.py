@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from scipy.stats import spearmanr
 
 from er_il.report.tables import joined
@@ -46,41 +47,28 @@ def predict(report: Mapping[str, Any], cells: Sequence[Mapping[str, Any]]) -> li
         trained, by number or within the best one's interval.
     """
     found = []
-    for task in dict.fromkeys(cell["task"] for cell in cells):
-        risks = _risks(report, task)
-        trained = {_choice(cell["decoder"], report): cell for cell in cells if cell["task"] == task}
-        rows = [
-            {"joints": name, "risk": risks[name], "success": cell["successes"] / cell["episodes"]}
-            | {key: cell[key] for key in KEYS if key != "task"}
-            for name, cell in trained.items()
-            if name in risks
-        ]
+    for task, trained in pd.DataFrame(cells, columns=pd.Index(KEYS)).groupby("task", sort=False):
+        risks = {joined(each["joints"]): each["risk"] for each in report["demos"].get(task, report["workspace"])}
+        joints = [joined(split_name(decoder)[1] or report["default"]) for decoder in trained["decoder"]]
+        rows = trained.drop(columns="task").assign(
+            joints=joints,
+            risk=[risks.get(choice) for choice in joints],
+            success=trained["successes"] / trained["episodes"],
+        )
+        rows = rows.dropna(subset="risk").drop_duplicates("joints", keep="last")
         if len(rows) < 2:
             continue
-        top, best = min(rows, key=lambda row: row["risk"]), max(rows, key=lambda row: row["success"])
+        top, best = rows.loc[rows["risk"].idxmin()], rows.loc[rows["success"].idxmax()]
+        alike = 1 in (rows["risk"].nunique(), rows["success"].nunique())
+        correlation = None if alike else float(np.asarray(spearmanr(-rows["risk"], rows["success"]))[0])
         found.append(
             {
                 "task": task,
-                "choices": rows,
-                "rank_correlation": _correlation(rows),
+                "choices": rows.to_dict("records"),
+                "rank_correlation": correlation,
                 "top_choice": top["joints"],
-                "top_choice_is_best": top["success"] == best["success"],
-                "top_choice_within_interval_of_best": top["success"] >= best["interval"][0],
+                "top_choice_is_best": bool(top["success"] == best["success"]),
+                "top_choice_within_interval_of_best": bool(top["success"] >= best["interval"][0]),
             }
         )
     return found
-
-
-def _risks(report: Mapping[str, Any], task: str) -> dict[str, float]:
-    return {joined(each["joints"]): each["risk"] for each in report["demos"].get(task, report["workspace"])}
-
-
-def _choice(decoder: str, report: Mapping[str, Any]) -> str:
-    return joined(split_name(decoder)[1] or report["default"])
-
-
-def _correlation(rows: Sequence[Mapping[str, Any]]) -> float | None:
-    risks, successes = [row["risk"] for row in rows], [row["success"] for row in rows]
-    if len(set(risks)) == 1 or len(set(successes)) == 1:
-        return None
-    return float(np.asarray(spearmanr(-np.array(risks), successes))[0])
