@@ -9,7 +9,7 @@ from er_il.cli.arm_options import ArmOptions
 
 if TYPE_CHECKING:
     from er_il.arms.arm import Arm
-    from er_il.experiments.studies.joints import Demos
+    from er_il.experiments.studies import Demos
 
 ROWS = 10  # of the table; --json has all
 

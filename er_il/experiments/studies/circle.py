@@ -2,9 +2,8 @@
 
 The end effector's pose repeats with every lap. Inverse kinematics that is given the pose alone takes, each time, the
 joints nearest to the current ones; small steps add up, and after a lap the elbow is elsewhere. ERJ commands one more
-joint, so that the same action means the same configuration.
-
-Everything is kinematics: each solution is the seed of the next, as on an arm that follows exactly.
+joint, so that the same action means the same configuration. Each solution is the seed of the next, as on an arm that
+follows exactly.
 """
 
 from collections.abc import Callable
@@ -58,35 +57,30 @@ def study_circle(arm: Arm) -> dict[str, Any]:
     """
     if arm.angle_frames is None or not arm.redundancy:
         raise ArmError(f"{arm.name} has no elbow to watch: it needs more than six joints, and angle frames.")
-    drives = [{"solver": name} | _drive(arm, arm.angle_frames.elbow, q) for name, q in drive_all(arm).items()]
-    circle = targets(arm)[:POSES, :3, 3].round(DIGITS).tolist()
+    kinematics, poses, frames = kinematics_of(arm), targets(arm), (arm.base_frame, *arm.joints, arm.ee_frame)
+    drives = []
+    for name, q in drive_all(arm).items():
+        errors = np.array([kinematics.pose_error(pose, each) for pose, each in zip(poses, q[1:], strict=True)])
+        links = np.stack([kinematics.fk_batch(q[::POSES], frame)[:, :3, 3] for frame in frames], axis=1)
+        elbow = kinematics.fk_batch(q, arm.angle_frames.elbow)[:, :3, 3]
+        drives.append(
+            {
+                "solver": name,
+                "drift": np.linalg.norm(elbow[POSES::POSES] - elbow[0], axis=1).tolist(),  # [m] after each lap
+                "max_position_error": float(errors[:, 0].max()),  # [m]
+                "max_rotation_error": float(errors[:, 1].max()),  # [rad]
+                "links": links.round(DIGITS).tolist(),  # [m] in the base frame, at the start and after each lap
+                "elbow": elbow[::EVERY].round(DIGITS).tolist(),  # [m]
+            }
+        )
     how = {"arm": arm.name, "start": arm.home.tolist(), "radius": RADIUS, "laps": LAPS, "poses_a_lap": POSES}
-    return {"meta": how | {"circle": circle}, "drives": drives}
-
-
-def _drive(arm: Arm, elbow: str, q: Array) -> dict[str, Any]:
-    """What the report says of a path; positions [m] in the base frame, errors the largest [m, rad]."""
-    kinematics = kinematics_of(arm)
-    errors = np.array([kinematics.pose_error(pose, each) for pose, each in zip(targets(arm), q[1:], strict=True)])
-    frames = (arm.base_frame, *arm.joints, arm.ee_frame)
-    links = np.stack([kinematics.fk_batch(q[::POSES], frame)[:, :3, 3] for frame in frames], axis=1)
-    elbows = kinematics.fk_batch(q, elbow)[:, :3, 3]
-    return {
-        "drift": np.linalg.norm(elbows[POSES::POSES] - elbows[0], axis=1).tolist(),  # at the end of each lap
-        "max_position_error": float(errors[:, 0].max()),
-        "max_rotation_error": float(errors[:, 1].max()),
-        "links": links.round(DIGITS).tolist(),  # at the start and the end of each lap
-        "elbow": elbows[::EVERY].round(DIGITS).tolist(),
-    }
+    return {"meta": how | {"circle": poses[:POSES, :3, 3].round(DIGITS).tolist()}, "drives": drives}
 
 
 def _lerobot(arm: Arm) -> Solver:
-    """LeRobot's class as it is, with its own weights, in degrees.
-
-    Its forward kinematics comes first, as in its pipelines: alone, the first solution would start
-    from the zero posture, whatever the seed.
-    """
+    """LeRobot's class as it is, with its own weights, in degrees."""
     solver = RobotKinematics(str(generated_urdf(arm.model_xml, arm.urdf.name)), arm.ee_frame, list(arm.joints))
+    # Forward kinematics comes first, as in LeRobot's pipelines: else the first solution starts from the zero posture.
     T_world_base = solver.forward_kinematics(np.rad2deg(arm.home)) @ np.linalg.inv(kinematics_of(arm).fk(arm.home))
     return lambda seed, pose: np.deg2rad(solver.inverse_kinematics(np.rad2deg(seed), T_world_base @ pose))
 

@@ -34,27 +34,24 @@ def read_training(path: Path) -> list[dict[str, Any]]:
 def predict(report: Mapping[str, Any], cells: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Compare a study's ranking with success after training, task by task.
 
-    A choice's predicted risk on a task is that along its demonstrations if the study had them, else
-    over the workspace.
+    A choice's predicted risk on a task is that along its demonstrations if the study had them, else over the workspace.
 
     Args:
         report: See :func:`er_il.experiments.studies.joints.study_joints`.
         cells: See :func:`read_training`.
 
     Returns:
-        For each task: risk and success of each choice, Spearman's correlation of success with low
-        risk (None where all succeed alike), and whether the choice with the least risk is the best
-        trained, by number or within the best one's interval.
+        For each task: risk and success of each choice, Spearman's correlation of success with low risk (None where all
+        succeed alike), and whether the choice with the least risk is the best trained, by number or within the best
+        one's interval.
     """
+    data = pd.DataFrame(cells, columns=pd.Index(KEYS))
+    data["joints"] = [joined(split_name(decoder)[1] or report["default"]) for decoder in data["decoder"]]
+    data["success"] = data["successes"] / data["episodes"]
     found = []
-    for task, trained in pd.DataFrame(cells, columns=pd.Index(KEYS)).groupby("task", sort=False):
+    for task, trained in data.groupby("task", sort=False):
         risks = {joined(each["joints"]): each["risk"] for each in report["demos"].get(task, report["workspace"])}
-        joints = [joined(split_name(decoder)[1] or report["default"]) for decoder in trained["decoder"]]
-        rows = trained.drop(columns="task").assign(
-            joints=joints,
-            risk=[risks.get(choice) for choice in joints],
-            success=trained["successes"] / trained["episodes"],
-        )
+        rows = trained.drop(columns="task").assign(risk=[risks.get(choice) for choice in trained["joints"]])
         rows = rows.dropna(subset="risk").drop_duplicates("joints", keep="last")
         if len(rows) < 2:
             continue
