@@ -137,7 +137,7 @@ def test_back_to_joints_through_the_decoder(places, tmp_path, monkeypatch):
     )
 
 
-def test_flagged_frames_and_stretches_near_singularities_are_found(places, tmp_path, monkeypatch):
+def test_flagged_frames_and_intervals_near_singularities_are_found(places, tmp_path, monkeypatch):
     """Episode 1 passes through the stretched elbow, 2 has an action that cannot be decoded, in 3 the hand spins."""
     names = [f"{joint}.pos" for joint in Dataset(places / "erj").layout.parts[0].space.arm.joints]
     feature = {"dtype": "float32", "shape": (7,), "names": names}
@@ -157,10 +157,10 @@ def test_flagged_frames_and_stretches_near_singularities_are_found(places, tmp_p
     _spoil(tmp_path / "erj", row=75)
     report = _verified(monkeypatch, tmp_path / "erj", tmp_path / "report")
     assert report["invalid_by_episode"] == {"2": {"invalid": 1}}
-    stretches = report["near_singularity"]
-    assert stretches
-    assert {(each["episode"], each["arm"]) for each in stretches} == {(1, "panda")}
-    assert any(each["first"] <= 15 <= each["last"] for each in stretches)
+    intervals = report["near_singularity"]
+    assert intervals
+    assert {(each["episode"], each["arm"]) for each in intervals} == {(1, "panda")}
+    assert any(each["first"] <= 15 <= each["last"] for each in intervals)
     assert report["arms"]["panda"]["joint_error_unflagged"]["p100"] <= 1e-3
     assert 1 < report["arms"]["panda"]["flagged"] < 30
     assert 0 < report["arms"]["panda"]["quaternions_other_side"] < 0.25

@@ -11,11 +11,13 @@ from documented import documented
 
 from er_il import Arm, Status
 from er_il.cli import main
-from er_il.datasets.joint_path import JointPath
+from er_il.control.commander import Commander
+from er_il.datasets.joint_paths import JointPath
 from er_il.experiments.studies.prediction import predict, read_training
 from er_il.experiments.studies.validity import SIZES, Condition, measure, study_validity
 from er_il.report.joints import notes, training_notes
 from er_il.spaces.joint_choice import choices
+from er_il.spaces.registry import make_arm_space
 from er_il.support.errors import DatasetError
 
 PANDA = Arm.preset("panda")
@@ -42,6 +44,28 @@ def test_larger_actions_are_more_often_invalid(space, mode):
     assert invalid[-1] > 20
     again = measure(conditions[1], PANDA, states)
     assert again.drop(columns="latency").equals(actions[1].drop(columns="latency"))
+
+
+@pytest.mark.parametrize(("space", "dimensions"), [("task", (6, 7)), ("erj", (7, 8)), ("era", (7, 8))])
+def test_every_number_of_an_action_changes_and_those_of_the_pose_alike_in_all_spaces(monkeypatch, space, dimensions):
+    """Delta actions within their size, absolute ones by a normal error of it."""
+    states, seen = near_home(30), []
+    command = Commander.command
+    monkeypatch.setattr(Commander, "command", lambda self, action, q: seen.append(action) or command(self, action, q))
+
+    def changes(name: str, mode: str) -> np.ndarray:
+        seen.clear()
+        measure(Condition(name, mode, "demos", True, SIZES[1]), PANDA, states)
+        meant = [np.zeros_like(seen[0]) if mode == "delta" else make_arm_space(name, PANDA).encode(q) for q in states]
+        return np.array(seen[-len(states) :]) - meant
+
+    for mode, dimension in zip(("delta", "absolute"), dimensions, strict=True):
+        found = changes(space, mode)
+        assert found.shape == (30, dimension)
+        assert np.all(found.std(axis=0) > 0.3 * SIZES[1])
+        np.testing.assert_array_equal(found[:, :3], changes("task", mode)[:, :3])
+    assert np.abs(changes(space, "delta")[:, :3]).max() <= SIZES[1]
+    assert np.abs(changes(space, "delta")[:, 3:]).max() <= 3 * SIZES[1]
 
 
 def test_causes_are_told_apart():

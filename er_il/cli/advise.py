@@ -9,7 +9,7 @@ from er_il.cli.arm_options import ArmOptions
 
 if TYPE_CHECKING:
     from er_il.arms.arm import Arm
-    from er_il.experiments.studies.joints import Demos
+    from er_il.experiments.studies import Demos
 
 ROWS = 10  # of the table; --json has all
 
@@ -77,19 +77,18 @@ def _arms(source: str, robot: ArmOptions, episodes: int) -> "dict[str, tuple[Arm
     if source in PRESETS or (Path(source).is_file() and Path(source).suffix in (".urdf", ".xml")):
         if robot.arm or robot.arms:
             raise DatasetError(f"{source} is an arm: --arm and --arms are for datasets that do not know theirs.")
-        return {"": (robot.wiring().model_copy(update={"arm": source}).build_arm(), {})}
+        return {"": (replace(robot, arm=source).wiring().build_arm(), {})}
     wirings = robot.wirings()
     if Path(source).suffix in (".urdf", ".xml"):
         raise DatasetError(f"There is no file {source}. Presets are {', '.join(sorted(PRESETS))}.")
 
     from er_il.datasets.hub import find_dataset
     from er_il.datasets.joint_paths import read_joint_paths
-    from er_il.experiments.studies.demos import spread
     from er_il.support.workers import cores
 
     read = read_joint_paths(find_dataset(source), wirings, cores())
     name = Path(source).resolve().name if Path(source).exists() else source
-    return {each.label: (each.arm, {name: spread(each.paths, episodes)}) for each in read}
+    return {each.label: (each.arm, {name: each.spread(episodes)}) for each in read}
 
 
 def _named(path: Path, label: str) -> Path:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from er_il.arms.arm import Arm
-    from er_il.experiments.studies.joints import Demos
+    from er_il.experiments.studies import Demos
 
     Measure = Callable[[Arm, Demos, Callable[[int, int], object]], dict[str, Any]]
 

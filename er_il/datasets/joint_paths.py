@@ -1,15 +1,40 @@
 """The joint angles in a dataset, arm by arm and episode by episode, whatever its action space."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from er_il.arms.arm import Arm
 from er_il.datasets.dataset import Dataset
 from er_il.datasets.decoding import decode_episodes, read_encoded_episodes
-from er_il.datasets.joint_path import ArmPaths, JointPath
 from er_il.datasets.wiring import Wiring, wire
+from er_il.spaces.base import Array
 from er_il.support.errors import DatasetError
+
+
+@dataclass(frozen=True, eq=False)
+class JointPath:
+    """One episode of one arm, T steps."""
+
+    episode: int
+    commanded: Array  # (T, n) [rad]
+    measured: Array  # (T, n) [rad] what was commanded the step before, where nothing was measured
+
+
+@dataclass(frozen=True, eq=False)
+class ArmPaths:
+    """All episodes of one arm."""
+
+    label: str  # "" where there is but one arm
+    arm: Arm
+    paths: tuple[JointPath, ...]
+
+    def spread(self, count: int) -> tuple[JointPath, ...]:
+        """At most ``count`` of the episodes, spread evenly from the first to the last."""
+        chosen = sorted({round(i * (len(self.paths) - 1) / max(1, count - 1)) for i in range(count)})
+        return tuple(self.paths[i] for i in chosen)
 
 
 def read_joint_paths(root: Path, wirings: Sequence[Wiring] = (), workers: int = 1) -> list[ArmPaths]:

@@ -15,7 +15,7 @@ from er_il.datasets.sanity_checks import JointSample, check_joint_values
 from er_il.datasets.schema import STATE
 from er_il.kinematics.rotation import Quaternion
 from er_il.kinematics.solver import LIMIT_MARGIN, Status
-from er_il.spaces.joint_choice import stretches
+from er_il.spaces.joint_choice import singular_intervals
 from er_il.spaces.layout import Layout
 from er_il.spaces.pose import PoseSpace
 from er_il.spaces.round_trip import SINGULAR
@@ -25,17 +25,6 @@ Flags = NDArray[np.bool_]
 
 PERCENTILES = (50, 95, 99, 100)
 POSITION_NAMES = ("ee.x", "ee.y", "ee.z")
-
-
-@dataclass(frozen=True)
-class SingularInterval:
-    """Consecutive frames of an episode in which an arm is near a singularity."""
-
-    episode: int
-    arm: str
-    first: int
-    last: int
-    smallest: float  # smallest singular value, metres and radians mixed
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,15 +76,6 @@ class Verification:
             if set(counter) != {Status.OK}
         }
 
-    def singular_intervals(self) -> list[SingularInterval]:
-        """Intervals in which arms are near singularities."""
-        return [
-            SingularInterval(each.number, label, *interval)
-            for each in self.episodes
-            for arm, label in enumerate(self.arms)
-            for interval in stretches(each.conditioning[:, arm])
-        ]
-
     def report(self) -> dict[str, Any]:
         """Everything as JSON."""
         arms = {}
@@ -116,7 +96,12 @@ class Verification:
             "episodes": len(self.episodes),
             "arms": arms,
             "invalid_by_episode": self.invalid(),
-            "near_singularity": [vars(interval) for interval in self.singular_intervals()],
+            "near_singularity": [
+                {"episode": each.number, "arm": label} | vars(interval)
+                for each in self.episodes
+                for arm, label in enumerate(self.arms)
+                for interval in singular_intervals(each.conditioning[:, arm])
+            ],
         }
 
 

@@ -13,8 +13,9 @@ Lengths weigh by ``LENGTH`` against angles in singular values; det N_S does with
 """
 
 import itertools
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,12 +24,12 @@ from scipy.spatial.transform import Rotation
 from er_il.arms.arm import Arm, Vector
 from er_il.kinematics.redundancy import JointAngle, Redundancy
 from er_il.kinematics.solver import Status, kinematics_of
+from er_il.spaces.base import Array
 from er_il.spaces.pose import PoseSpace
 from er_il.spaces.registry import ERJ, make_arm_space
 from er_il.spaces.round_trip import SINGULAR, round_trip
 from er_il.support.errors import ArmError
 
-Array = NDArray[np.float64]
 Choice = tuple[str, ...]  # the n-6 joints that ERJ commands
 
 LENGTH = 1.0  # [m] that weighs as much as 1 rad
@@ -38,13 +39,21 @@ POSITION_ERROR, ANGLE_ERROR = 2e-3, 6e-3  # [m, rad] standard deviations of a po
 ROUND_TRIPS = 200  # of a choice, over the workspace and along demos
 
 
-@dataclass(frozen=True, eq=False)
-class Sensitivity:
+class Sensitivity(NamedTuple):
     """What a choice leaves to IK at N configurations."""
 
     smallest: Vector  # (N,) smallest singular value of J_-S
     condition: Vector  # (N,) largest by smallest
     self_motion: Vector  # (N,) |det N_S| with the sign of det J_-S, which changes at folds
+
+
+@dataclass(frozen=True)
+class SingularInterval:
+    """Consecutive frames of an episode near a singularity."""
+
+    first: int
+    last: int
+    smallest: float  # smallest singular value, metres and radians mixed
 
 
 @dataclass(frozen=True)
@@ -80,22 +89,11 @@ def choices(arm: Arm) -> list[Choice]:
     return list(itertools.combinations(arm.joints, arm.redundancy))
 
 
-def sensitivities(arm: Arm, q: Array) -> dict[Choice, Sensitivity]:
-    """What every choice leaves to IK at configurations q (N, n) [rad]."""
-    jacobians = weighted_jacobians(arm, q)
-    return {choice: sensitivity(JointAngle(arm, choice), jacobians, q) for choice in choices(arm)}
-
-
-def weighted_jacobians(arm: Arm, q: Array) -> Array:
-    """End-effector Jacobians (N, 6, n) at q (N, n) [rad], lengths weighed by ``LENGTH`` against angles."""
-    kinematics = kinematics_of(arm)
-    jacobians = np.array([kinematics.jacobian(each) for each in q])
+def sensitivity(redundancy: Redundancy, q: Array) -> Sensitivity:
+    """What a redundancy leaves to IK at configurations q (N, n) [rad]."""
+    kinematics = kinematics_of(redundancy.arm)
+    jacobians = np.array([kinematics.jacobian(each) for each in q])  # (N, 6, n)
     jacobians[:, :3] /= LENGTH
-    return jacobians
-
-
-def sensitivity(redundancy: Redundancy, jacobians: Array, q: Array) -> Sensitivity:
-    """What a redundancy leaves to IK at configurations q (N, n) [rad] with weighted Jacobians (N, 6, n)."""
     derivative = np.array([redundancy.linearise(each).derivative for each in q])  # (N, m, n)
     left = jacobians if redundancy.held else np.concatenate([jacobians, derivative], axis=1)
     left = np.delete(left, list(redundancy.held), axis=2)
@@ -106,11 +104,11 @@ def sensitivity(redundancy: Redundancy, jacobians: Array, q: Array) -> Sensitivi
     return Sensitivity(smallest, values[:, 0] / np.maximum(smallest, 1e-12), np.sign(np.linalg.det(left)) * share)
 
 
-def stretches(smallest: Vector) -> list[tuple[int, int, float]]:
-    """First and last frame of each stretch (T,) near a singularity, and the smallest singular value in it."""
+def singular_intervals(smallest: Vector) -> list[SingularInterval]:
+    """Intervals of a path near a singularity, by its smallest singular values (T,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], smallest < SINGULAR, [False]]).astype(int)))
     ranges = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
-    return [(first, stop - 1, float(smallest[first:stop].min())) for first, stop in ranges]
+    return [SingularInterval(first, stop - 1, float(smallest[first:stop].min())) for first, stop in ranges]
 
 
 def crossings(self_motion: Vector) -> int:
@@ -118,38 +116,30 @@ def crossings(self_motion: Vector) -> int:
     return int(np.count_nonzero(np.diff(np.sign(self_motion))))
 
 
-def over_workspace(arm: Arm, choice: Choice, q: Array, sensitivity: Sensitivity) -> Fitness:
+def over_workspace(arm: Arm, choice: Choice, q: Array) -> Fitness:
     """Measure a choice over configurations q (N, n) [rad] within the limits, in no order.
 
     ``risk`` is the share near a singularity.
     """
-    missed, flipped = _round_trips(arm, choice, q)
-    near = sensitivity.smallest < SINGULAR
-    return Fitness(choice, len(q), *_summary(sensitivity), missed, flipped, float(near.mean()))
+    found = sensitivity(JointAngle(arm, choice), q)
+    return _fitness(arm, choice, q, found, found.smallest < SINGULAR)
 
 
-def along_demos(arm: Arm, choice: Choice, demos: Sequence[Array], sensitivity: Sequence[Sensitivity]) -> Fitness:
-    """Measure a choice along demos, each (T, n) [rad] in time order, with the sensitivity along each.
+def along_demos(arm: Arm, choice: Choice, demos: Sequence[Array]) -> Fitness:
+    """Measure a choice along demos, each (T, n) [rad] in time order.
 
     A demo is played back as a policy would that has learnt it: its actions with small errors, each
     decoded from where the last one led. ``risk`` is the share of steps near a singularity, or on
     another branch in playback.
     """
-    space = _space(arm, choice)
-    whole = Sensitivity(
-        *(np.concatenate([getattr(each, part.name) for each in sensitivity]) for part in fields(Sensitivity))
-    )
+    space, q = _space(arm, choice), np.concatenate(demos)
+    found = sensitivity(JointAngle(arm, choice), q)
+    ends = np.cumsum([len(demo) for demo in demos])[:-1]
     off = [play_back(space, demo, np.random.default_rng(i)) > FLIP for i, demo in enumerate(demos)]
-    risky = np.concatenate(off) | (whole.smallest < SINGULAR)
-    missed, flipped = _round_trips(arm, choice, np.concatenate(demos))
-    return Fitness(
-        choice,
-        len(risky),
-        *_summary(whole),
-        missed,
-        flipped,
-        float(risky.mean()),
-        folds=float(np.mean([crossings(each.self_motion) for each in sensitivity])),
+    risky = np.concatenate(off) | (found.smallest < SINGULAR)
+    return replace(
+        _fitness(arm, choice, q, found, risky),
+        folds=float(np.mean([crossings(each) for each in np.split(found.self_motion, ends)])),
         off=float(np.concatenate(off).mean()),
         flips=float(np.mean([np.count_nonzero(np.diff(each)) for each in off])),
     )
@@ -166,14 +156,17 @@ def play_back(space: PoseSpace, demo: Array, rng: np.random.Generator) -> Vector
     return np.array(distances)
 
 
-def ranked(fitness: Sequence[Mapping[Choice, Fitness]]) -> list[Choice]:
-    """Choices from the best to the worst: by their mean risk over sets of configurations, then by singular values."""
+def ranked(sets: Sequence[Sequence[Fitness]]) -> list[Choice]:
+    """Choices from the best to the worst: by their mean risk over sets of configurations, then by singular values.
 
-    def key(choice: Choice) -> tuple[float, float]:
-        each = [of_set[choice] for of_set in fitness]
-        return float(np.mean([one.risk for one in each])), -float(np.mean([one.smallest_p50 for one in each]))
+    Each set has the fitness of the same choices in the same order.
+    """
 
-    return sorted(fitness[0], key=key)
+    def key(of_choice: Sequence[Fitness]) -> tuple[float, float]:
+        risks, smallest = [each.risk for each in of_choice], [each.smallest_p50 for each in of_choice]
+        return float(np.mean(risks)), -float(np.mean(smallest))
+
+    return [of_choice[0].joints for of_choice in sorted(zip(*sets, strict=True), key=key)]
 
 
 def _space(arm: Arm, choice: Choice) -> PoseSpace:
@@ -182,20 +175,21 @@ def _space(arm: Arm, choice: Choice) -> PoseSpace:
     return space
 
 
-def _summary(sensitivity: Sensitivity) -> tuple[float, float, float, float, float]:
-    low, middle = np.percentile(sensitivity.smallest, [5, 50]).tolist()
-    return (
-        low,
-        middle,
-        float(np.median(sensitivity.condition)),
-        float(np.abs(sensitivity.self_motion).mean()),
-        float((sensitivity.smallest < SINGULAR).mean()),
-    )
-
-
-def _round_trips(arm: Arm, choice: Choice, q: Array) -> tuple[float, float]:
-    """Shares of round trips that missed the joints, and that met the action with other joints."""
+def _fitness(arm: Arm, choice: Choice, q: Array, sensitivity: Sensitivity, risky: NDArray[np.bool_]) -> Fitness:
+    """What is measured over the workspace and along demos alike; ``risky`` (N,) marks what counts as risk."""
     space, rng = _space(arm, choice), np.random.default_rng(0)
     rows = np.unique(np.linspace(0, len(q) - 1, ROUND_TRIPS).astype(int))
     missed = [trip for trip in (round_trip(space, q[row], SEED_ERROR, rng) for row in rows) if not trip.exact]
-    return len(missed) / len(rows), sum(trip.decoded.status is Status.OK for trip in missed) / len(rows)
+    low, middle = np.percentile(sensitivity.smallest, [5, 50]).tolist()
+    return Fitness(
+        joints=choice,
+        configurations=len(q),
+        smallest_p05=low,
+        smallest_p50=middle,
+        condition_p50=float(np.median(sensitivity.condition)),
+        self_motion=float(np.abs(sensitivity.self_motion).mean()),
+        near_singular=float((sensitivity.smallest < SINGULAR).mean()),
+        missed=len(missed) / len(rows),
+        flipped=sum(trip.decoded.status is Status.OK for trip in missed) / len(rows),
+        risk=float(risky.mean()),
+    )

@@ -6,25 +6,25 @@ from pathlib import Path
 from rich.progress import Progress
 
 from er_il.arms.arm import Arm
-from er_il.datasets.joint_path import ArmPaths, JointPath
-from er_il.datasets.joint_paths import read_joint_paths
+from er_il.datasets.joint_paths import ArmPaths, read_joint_paths
 from er_il.datasets.recipe import Recipe, recipe_names
 from er_il.datasets.recording import generate
+from er_il.experiments.studies import Demos
 from er_il.spaces.joint import JOINT
 from er_il.support.errors import DatasetError, UnknownNameError
 
 
 def study_demos(
     names: Sequence[str], episodes: int, folder: Path, progress: Progress, workers: int
-) -> tuple[Arm, dict[str, tuple[JointPath, ...]]]:
+) -> tuple[Arm, Demos]:
     """Read datasets of one arm, or record them.
 
     Args:
         names: Folders of datasets, or tasks.
         episodes: Demonstrations to record of a task; of a dataset, so many are looked at, spread evenly.
         folder: Where tasks are recorded, one folder each. What is there already is used again.
-        progress: Where to show progress.
-        workers: Number of worker processes.
+        progress: Where to show the recording.
+        workers: Number of processes that record or decode.
 
     Returns:
         The arm, and its demonstrations by name of the task or dataset.
@@ -39,25 +39,16 @@ def study_demos(
         if not dataset.is_dir():
             if name not in recipe_names():
                 raise UnknownNameError("dataset or task", name, ["the folder of a dataset", *recipe_names()])
-            made = generate(Recipe.load(name).resized(episodes), [JOINT], folder / name, progress, workers)
-            dataset = made.paths[JOINT]
+            recipe = Recipe.load(name).resized(episodes)
+            dataset = generate(recipe, [JOINT], folder / name, progress, workers).paths[JOINT]
         first, *others = read_joint_paths(dataset, workers=workers)
         if others:
             raise DatasetError(f"{name} is of several arms; a study is of one. er-il advise looks at each.")
-        found[_unique(dataset.parent.name if dataset.name == JOINT else dataset.name, found)] = first
+        label = dataset.parent.name if dataset.name == JOINT else dataset.name
+        found[f"{label}-{len(found) + 1}" if label in found else label] = first
     arms = [paths.arm for paths in found.values()]
     if not arms:
         raise DatasetError("Name a dataset or a task, such as reach_cup.")
     if {arm.fingerprint for arm in arms} != {arms[0].fingerprint}:
         raise DatasetError(f"The datasets are of several arms: {', '.join(arm.name for arm in arms)}.")
-    return arms[0], {name: spread(each.paths, episodes) for name, each in found.items()}
-
-
-def spread(paths: Sequence[JointPath], count: int) -> tuple[JointPath, ...]:
-    """At most ``count`` of the episodes, spread evenly from the first to the last."""
-    chosen = sorted({round(i * (len(paths) - 1) / max(1, count - 1)) for i in range(count)})
-    return tuple(paths[i] for i in chosen)
-
-
-def _unique(name: str, taken: dict[str, ArmPaths]) -> str:
-    return name if name not in taken else f"{name}-{len(taken) + 1}"
+    return arms[0], {name: each.spread(episodes) for name, each in found.items()}

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from scipy.stats import spearmanr
 
 from er_il.report.tables import joined
@@ -33,54 +34,38 @@ def read_training(path: Path) -> list[dict[str, Any]]:
 def predict(report: Mapping[str, Any], cells: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Compare a study's ranking with success after training, task by task.
 
-    A choice's predicted risk on a task is that along its demonstrations if the study had them, else
-    over the workspace.
+    A choice's predicted risk on a task is that along its demonstrations if the study had them, else over the workspace.
 
     Args:
         report: See :func:`er_il.experiments.studies.joints.study_joints`.
         cells: See :func:`read_training`.
 
     Returns:
-        For each task: risk and success of each choice, Spearman's correlation of success with low
-        risk (None where all succeed alike), and whether the choice with the least risk is the best
-        trained, by number or within the best one's interval.
+        For each task: risk and success of each choice, Spearman's correlation of success with low risk (None where all
+        succeed alike), and whether the choice with the least risk is the best trained, by number or within the best
+        one's interval.
     """
+    data = pd.DataFrame(cells, columns=pd.Index(KEYS))
+    data["joints"] = [joined(split_name(decoder)[1] or report["default"]) for decoder in data["decoder"]]
+    data["success"] = data["successes"] / data["episodes"]
     found = []
-    for task in dict.fromkeys(cell["task"] for cell in cells):
-        risks = _risks(report, task)
-        trained = {_choice(cell["decoder"], report): cell for cell in cells if cell["task"] == task}
-        rows = [
-            {"joints": name, "risk": risks[name], "success": cell["successes"] / cell["episodes"]}
-            | {key: cell[key] for key in KEYS if key != "task"}
-            for name, cell in trained.items()
-            if name in risks
-        ]
+    for task, trained in data.groupby("task", sort=False):
+        risks = {joined(each["joints"]): each["risk"] for each in report["demos"].get(task, report["workspace"])}
+        rows = trained.drop(columns="task").assign(risk=[risks.get(choice) for choice in trained["joints"]])
+        rows = rows.dropna(subset="risk").drop_duplicates("joints", keep="last")
         if len(rows) < 2:
             continue
-        top, best = min(rows, key=lambda row: row["risk"]), max(rows, key=lambda row: row["success"])
+        top, best = rows.loc[rows["risk"].idxmin()], rows.loc[rows["success"].idxmax()]
+        alike = 1 in (rows["risk"].nunique(), rows["success"].nunique())
+        correlation = None if alike else float(np.asarray(spearmanr(-rows["risk"], rows["success"]))[0])
         found.append(
             {
                 "task": task,
-                "choices": rows,
-                "rank_correlation": _correlation(rows),
+                "choices": rows.to_dict("records"),
+                "rank_correlation": correlation,
                 "top_choice": top["joints"],
-                "top_choice_is_best": top["success"] == best["success"],
-                "top_choice_within_interval_of_best": top["success"] >= best["interval"][0],
+                "top_choice_is_best": bool(top["success"] == best["success"]),
+                "top_choice_within_interval_of_best": bool(top["success"] >= best["interval"][0]),
             }
         )
     return found
-
-
-def _risks(report: Mapping[str, Any], task: str) -> dict[str, float]:
-    return {joined(each["joints"]): each["risk"] for each in report["demos"].get(task, report["workspace"])}
-
-
-def _choice(decoder: str, report: Mapping[str, Any]) -> str:
-    return joined(split_name(decoder)[1] or report["default"])
-
-
-def _correlation(rows: Sequence[Mapping[str, Any]]) -> float | None:
-    risks, successes = [row["risk"] for row in rows], [row["success"] for row in rows]
-    if len(set(risks)) == 1 or len(set(successes)) == 1:
-        return None
-    return float(np.asarray(spearmanr(-np.array(risks), successes))[0])
