@@ -70,6 +70,7 @@ def advise(
 
 def _arms(source: str, robot: ArmOptions, episodes: int) -> "dict[str, tuple[Arm, Demos]]":
     """Each arm by its label, and its demonstrations."""
+    from dataclasses import replace
 
     from er_il.arms.presets import PRESETS
     from er_il.support.errors import DatasetError
