@@ -6,20 +6,11 @@ A block between ``<!-- results/NAME -->`` and ``<!-- /results/NAME -->`` is the 
 
 import json
 import re
-from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
 
 from er_il.evaluation.results import RESULTS
 from er_il.report.joints import joints_table
-from er_il.report.tables import (
-    compact_table,
-    deltas_table,
-    drift_table,
-    round_trips_table,
-    success_table,
-    training_time_table,
-)
+from er_il.report.tables import compact_table, markdown_table, round_trips_table, success_texts, table
 from er_il.report.validity import validity_table
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -27,14 +18,14 @@ PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 BLOCK = re.compile(r"(<!-- (results/\w+) -->\n).*?(<!-- /\2 -->)", re.DOTALL)
 
 # How a report is shown, by a key that only such reports have.
-TABLES: dict[str, Callable[[Mapping[str, Any]], str]] = {
-    "drives": drift_table,
+TABLES = {
+    "drives": lambda report: markdown_table(table("drift", report["drives"])),
     "pooled": validity_table,
     "workspace": joints_table,
-    "drifts": deltas_table,
+    "drifts": lambda report: markdown_table(table("deltas", report["drifts"])),
     "round_trips": round_trips_table,
-    "training_times": training_time_table,
-    "cells": lambda report: success_table(report["cells"]),
+    "training_times": lambda report: markdown_table(table("training_time", report["training_times"])),
+    "cells": lambda report: markdown_table(success_texts(report["cells"])),
 }
 
 

@@ -14,10 +14,9 @@ HEADINGS = ("Task", "Decoder", "Success", "95 % interval", "Failures", "Invalid 
 
 def results_table(cells: Sequence[Mapping[str, Any]]) -> "Table":
     """Reported cells, one a row."""
-    from er_il.report.tables import success_columns, terminal_table
+    from er_il.report.tables import success_texts, terminal_table
 
-    columns = success_columns(cells)
-    return terminal_table(cells, {heading: columns[heading] for heading in HEADINGS})
+    return terminal_table(success_texts(cells).reindex(columns=list(HEADINGS)))
 
 
 def write_study(

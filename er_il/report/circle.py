@@ -34,6 +34,7 @@ def circle_figure(report: Report) -> Figure:
     laps = report["meta"]["laps"]
     colours = mpl.colormaps["inferno_r"](np.linspace(0.25, 0.85, laps + 1))  # the start first
     figure = Figure(figsize=SIZE)
+    figure.set_layout_engine("none")  # every part has its place
     titles = {LEROBOT: f"LeRobot {report['meta']['versions']['lerobot']}'s IK", "erj": "ERJ"}
     for column, (solver, title) in enumerate(titles.items()):
         axis = figure.add_axes((0.32 * column - 0.02, 0.0, 0.36, 0.98), projection="3d")

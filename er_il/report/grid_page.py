@@ -10,7 +10,7 @@ from er_il.evaluation.results import EPISODES, REFERENCE, RESULTS
 from er_il.report import paper
 from er_il.report.charts import demonstrations_figure, success_figure
 from er_il.report.style import save
-from er_il.report.tables import DIFFERENCE, compact_table, success_table
+from er_il.report.tables import compact_table, markdown_table, success_texts
 from er_il.report.text import render
 
 TABLE, PAGE = "table.md", "README.md"
@@ -35,7 +35,8 @@ def write_pages(folder: Path) -> None:
     marked = not varied and any(paper.share(*each) is not None for each in product(grid["tasks"], grid["decoders"]))
     figure = demonstrations_figure(cells) if varied else success_figure(cells, compared=compared)
     save(figure, folder / (CURVES if varied else BARS))
-    (folder / TABLE).write_text(success_table(cells) + "\n")
+    every_cell = markdown_table(success_texts(cells))
+    (folder / TABLE).write_text(every_cell + "\n")
     baselines = posture_baselines(grid)
     page = render(
         "grid.md.j2",
@@ -50,7 +51,7 @@ def write_pages(folder: Path) -> None:
         episodes=EPISODES,
         margin=MARGIN,
         table=compact_table(report),
-        every_cell=success_table(cells),
+        every_cell=every_cell,
         baselines_table=compact_table(report, (REFERENCE, *baselines)) if baselines else "",
         sufficient=sufficient_postures(report) if baselines else {},
         strips=sorted(path.stem for path in folder.glob(STRIPS)),
@@ -69,9 +70,11 @@ def sufficient_postures(report: Report) -> dict[str, list[str]]:
     """For each task with a paired difference: the posture baselines that do as well as the reference."""
     found: dict[str, list[str]] = {}
     for cell in report["cells"]:
-        if cell["decoder"] in posture_baselines(report["meta"]["grid"]) and DIFFERENCE in cell:
+        if cell["decoder"] in posture_baselines(report["meta"]["grid"]) and (
+            difference := cell.get(f"difference_to_{REFERENCE}")
+        ):
             names = found.setdefault(cell["task"], [])
-            if cell[DIFFERENCE]["interval"][0] > -MARGIN:
+            if difference["interval"][0] > -MARGIN:
                 names.append(cell["decoder"])
     return found
 

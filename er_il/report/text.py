@@ -16,6 +16,8 @@ _ENVIRONMENT = Environment(
 _ENVIRONMENT.filters |= {
     "percent": lambda value, digits=1: f"{value:.{digits}%}",
     "fixed": lambda value, digits: f"{value:.{digits}f}",
+    "scientific": lambda value: f"{value:.0e}",
+    "rates": lambda interval, digits=1: " – ".join(f"{bound:.{digits}%}" for bound in interval),
     "code": lambda names: ", ".join(f"`{name}`" for name in names),
     "tally": tally,
 }
