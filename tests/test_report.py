@@ -20,7 +20,8 @@ from er_il.report.films import PAUSE, WIDTH, Panel, Row, moments, strip_figure, 
 from er_il.report.grid_page import write_pages
 from er_il.report.joints import joints_figure
 from er_il.report.style import BAD, GOOD, LOOKS, OTHERS, looks_of
-from er_il.report.tables import compact_table, markdown_table, success_texts, terminal_table
+from er_il.report.tables import markdown_table, terminal_table
+from er_il.report.text import table
 from er_il.report.validity import validity_figure
 from er_il.report.verification import verification_figure, verification_notes
 from er_il.spaces.layout import Layout
@@ -49,7 +50,7 @@ CELLS = [
 
 
 def _success_table(cells: list[dict[str, Any]]) -> str:
-    return markdown_table(success_texts(cells))
+    return markdown_table(table("success", cells=cells))
 
 
 def pictures(count: int) -> list[np.ndarray]:
@@ -209,7 +210,7 @@ def test_a_grid_names_its_posture_baselines_or_as_version_0_1_its_sceptics(tmp_p
     assert "## Posture baselines" in page
     assert "sufficient on: `push_button_elbow` (`task-grasp`), `lift_cup` (`task-mean`, `task-grasp`)." in page
     assert "It is not sufficient on: `reach_cup`, `remove_cup`, `reach_remove_cup`, `retrieve_bear`." in page
-    assert compact_table(grid, ("joint", "task-mean", "task-grasp")) in page
+    assert markdown_table(table("compact", **grid, decoders=["joint", "task-mean", "task-grasp"])) in page
     grid["meta"]["grid"]["posture_baselines"] = grid["meta"]["grid"].pop("sceptics")
     (tmp_path / "results.json").write_text(json.dumps(grid))
     write_pages(tmp_path)

@@ -19,14 +19,15 @@ def circle(*, arm: str = "panda", out: Path = Path("outputs/circle")) -> None:
     from er_il.arms.arm import Arm
     from er_il.experiments.studies.circle import study_circle
     from er_il.report.circle import circle_figure
-    from er_il.report.tables import table, terminal_table
+    from er_il.report.tables import terminal_table
+    from er_il.report.text import table
     from er_il.support.provenance import provenance
 
     console = Console()
     with console.status("Solving along the circle"):
         report = study_circle(Arm.preset(arm))
     report["meta"] = provenance() | report["meta"]
-    texts = table("drift", report["drives"])
+    texts = table("drift", **report)
     shown = terminal_table(texts.rename(columns=lambda heading: heading.replace("Elbow drift after lap", "Lap")))
     shown.title = "Elbow drift"
     console.print(shown)

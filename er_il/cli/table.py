@@ -14,9 +14,10 @@ HEADINGS = ("Task", "Decoder", "Success", "95 % interval", "Failures", "Invalid 
 
 def results_table(cells: Sequence[Mapping[str, Any]]) -> "Table":
     """Reported cells, one a row."""
-    from er_il.report.tables import success_texts, terminal_table
+    from er_il.report.tables import terminal_table
+    from er_il.report.text import table
 
-    return terminal_table(success_texts(cells).reindex(columns=list(HEADINGS)))
+    return terminal_table(table("success", cells=cells).reindex(columns=list(HEADINGS)))
 
 
 def write_study(

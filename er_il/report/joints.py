@@ -2,15 +2,16 @@
 
 import itertools
 from collections.abc import Mapping, Sequence
+from statistics import mean
 from typing import Any
 
 import pandas as pd
 from matplotlib.figure import Figure
 
-from er_il.report.charts import bar_chart, percent_axis, where
+from er_il.report.charts import bar_chart, percent_axis
 from er_il.report.style import BLUE, GREEN, GREY, INK, ORANGE, OTHERS, PURPLE, RED, SKY, Look, legend, styled
-from er_il.report.tables import joined, markdown_table, table
-from er_il.report.text import sentences
+from er_il.report.tables import joined, markdown_table
+from er_il.report.text import sentences, table
 
 Report = Mapping[str, Any]
 
@@ -20,38 +21,22 @@ SMALLEST = 1e-4  # singular values below are drawn here: a logarithmic axis need
 COLOURS = (GREY, BLUE, ORANGE, GREEN, PURPLE, SKY, RED, *OTHERS)  # the workspace first, then the sets
 
 
-def measures(report: Report) -> pd.DataFrame:
-    """A row per set and choice: the set (``series``), the choice's ``name`` and label (``group``), and its measures."""
+def measures(report: Report) -> dict[str, dict[str, Mapping[str, Any]]]:
+    """Measures of each choice, by its name, over the workspace and along each set of demonstrations."""
     sets = {WORKSPACE: report["workspace"], **report["demos"]}
-    data = pd.DataFrame([{"series": name, **each} for name, of_set in sets.items() for each in of_set])
-    names, labels = [joined(choice) for choice in data["joints"]], _labels(report)
-    return data.assign(name=names, group=[labels[name] for name in names])
+    return {name: {joined(each["joints"]): each for each in of_set} for name, of_set in sets.items()}
 
 
 def risks(report: Report) -> dict[str, float]:
     """Risk of each choice: its mean over the demonstrations if there are any, else over the workspace."""
-    data = measures(report)
-    decisive = data["series"] != WORKSPACE if report["demos"] else slice(None)
-    return data.loc[decisive].groupby("name", sort=False)["risk"].mean().to_dict()
+    sets = measures(report)
+    decisive = [sets[name] for name in report["demos"] or (WORKSPACE,)]
+    return {name: mean(of_set[name]["risk"] for of_set in decisive) for name in decisive[0]}
 
 
 def notes(report: Report) -> list[str]:
     """Sentences that say which joints to command, why, which to avoid, and where singularities are near."""
-    data = measures(report)
-    best = where(data, name=joined(report["recommended"]))
-    shares = {joined(each["joints"]): each["self_motion"] for each in report["workspace"]}
-    return sentences(
-        "joint_notes.txt.j2",
-        report=report,
-        names=[joined(choice) for choice in report["ranking"]],
-        default=joined(report["default"]),
-        risks=risks(report),
-        over=where(best, series=WORKSPACE).iloc[0],
-        along=best.loc[best["series"] != WORKSPACE].to_dict("records"),
-        single=all(len(choice) == 1 for choice in report["ranking"]),
-        twisting={name: share for name, share in shares.items() if name in report["twisting"]},
-        bending={name: share for name, share in shares.items() if name not in report["twisting"]},
-    )
+    return sentences("joint_notes.txt.j2", report=report, sets=measures(report), risks=risks(report))
 
 
 def training_notes(report: Report) -> list[str]:
@@ -59,26 +44,26 @@ def training_notes(report: Report) -> list[str]:
     return sentences("joint_training.txt.j2", training=report.get("training", []))
 
 
-def choices_texts(report: Report, choices: Sequence[Sequence[str]]) -> pd.DataFrame:
-    """Texts of the study's table, a row per choice of joints."""
-    data, risk = measures(report), risks(report)
-    of_choice = {name: part.set_index("series").to_dict("index") for name, part in data.groupby("name")}
-    rows = [{"name": name, "risk": risk[name], "sets": of_choice[name]} for name in map(joined, choices)]
-    return table("joints", rows, demos=list(report["demos"]))
+def choices_texts(report: Report, choices: Sequence[str]) -> pd.DataFrame:
+    """Texts of the study's table, a row per name of a choice."""
+    return table("joints", report=report, sets=measures(report), risks=risks(report), choices=choices)
 
 
 def joints_table(report: Report) -> str:
     """Every choice of joints, the best first; then the notes."""
     risk = risks(report)
-    choices = sorted((each["joints"] for each in report["workspace"]), key=lambda choice: risk[joined(choice)])
     listed = "\n".join(f"- {note}" for note in [*notes(report), *training_notes(report)])
-    return f"{markdown_table(choices_texts(report, choices))}\n\n{listed}"
+    return f"{markdown_table(choices_texts(report, sorted(risk, key=risk.__getitem__)))}\n\n{listed}"
 
 
 @styled
 def joints_figure(report: Report) -> Figure:
     """Each choice of joints: self-motion, singularities, risk, round trips, playback and, if there, training."""
-    data, settings = measures(report), report["settings"]
+    labels, settings = _labels(report), report["settings"]
+    sets = measures(report).items()
+    data = pd.DataFrame(
+        [{"series": series, "group": labels[name], **each} for series, of_set in sets for name, each in of_set.items()]
+    )
     low, middle = (data[key].clip(lower=SMALLEST) for key in ("smallest_p05", "smallest_p50"))
     seed, action = settings["seed_error_rad"], 1e3 * settings["playback_error_m"]
     panels = {
@@ -89,7 +74,7 @@ def joints_figure(report: Report) -> Figure:
         f"Branch flips per demonstration, action error {action:.0f} mm": data.assign(value=data["flips"]).dropna(
             subset="value"
         ),
-        "Success of ACT policies trained with it [%]": _training(report),
+        "Success of ACT policies trained with it [%]": _training(report, labels),
     }
     panels = {title: panel for title, panel in panels.items() if len(panel)}
     columns = -(-len(panels) // 2)
@@ -114,9 +99,8 @@ def joints_figure(report: Report) -> Figure:
     return figure
 
 
-def _training(report: Report) -> pd.DataFrame:
+def _training(report: Report, labels: Mapping[str, str]) -> pd.DataFrame:
     """Success in percent of each task and choice that was trained."""
-    labels = _labels(report)
     rows = [
         {"series": each["task"], "group": labels[row["joints"]], "value": 100 * row["success"]}
         | dict(zip(("low", "high"), (100 * bound for bound in row["interval"]), strict=True))

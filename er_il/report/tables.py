@@ -1,32 +1,22 @@
-"""Tables of results in Markdown and in the terminal, rendered from the results' JSON alone."""
+"""Tables of texts, from the templates' rows to Markdown and the terminal."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from itertools import groupby, product
-from typing import Any
+import re
+from collections.abc import Sequence
 
 import pandas as pd
 from rich.markup import escape
 from rich.table import Table
 
-from er_il.evaluation.results import REFERENCE
-from er_il.evaluation.statistics import exact_interval
-from er_il.report.text import sentences
-
-Row = Mapping[str, Any]
-
 NONE = "–"
 
 
-def table(name: str, rows: Iterable[object], **values: object) -> pd.DataFrame:
-    """Texts of a table; a column that is empty in every row is left out.
+def read_rows(text: str) -> pd.DataFrame:
+    """Texts by heading from rows a blank line apart, each of lines ``heading | text``.
 
-    Args:
-        name: The template ``tables/<name>.j2``, which renders a row as lines ``heading | text``.
-        rows: What the template calls ``row``, one after the other.
-        values: What the template needs besides.
+    A column that is empty in every row is left out.
     """
-    lines = [[line.split("|", 1) for line in sentences(f"tables/{name}.j2", row=row, **values)] for row in rows]
-    texts = pd.DataFrame([{heading.strip(): text.strip() for heading, text in row} for row in lines])
+    rows = [[line.split("|", 1) for line in row.splitlines()] for row in re.split(r"\n\s*\n", text.strip("\n"))]
+    texts = pd.DataFrame([{heading.strip(): cell.strip() for heading, cell in row} for row in rows])
     return texts.loc[:, (texts != "").any()].replace("", NONE)
 
 
@@ -48,32 +38,6 @@ def terminal_table(texts: pd.DataFrame) -> Table:
 def joined(names: Sequence[str]) -> str:
     """Name of a choice of joints: ``panda_joint1``, or ``joint1 + joint3``."""
     return " + ".join(names)
-
-
-def success_texts(cells: Sequence[Row]) -> pd.DataFrame:
-    """Reported rollouts or replays, a row per cell: all that the cells have, the demonstrations where they vary."""
-    varied = len({cell.get("demonstrations") for cell in cells}) > 1
-    return table("success", cells, reference=REFERENCE, varied=varied)
-
-
-def compact_table(report: Row, decoders: Sequence[str] = ()) -> str:
-    """Successes with exact 95 % intervals, a row per task (and number of demonstrations) and a column per decoder.
-
-    Args:
-        report: Results of a grid.
-        decoders: Columns; the grid's decoders without the posture baselines if empty.
-    """
-    grid = report["meta"]["grid"]
-    cells = {(cell["task"], cell["demonstrations"], cell["decoder"]): cell for cell in report["cells"]}
-    rows, varied = product(grid["tasks"], grid["demonstrations"]), len(grid["demonstrations"]) > 1
-    return markdown_table(table("compact", rows, cells=cells, decoders=decoders or grid["decoders"], varied=varied))
-
-
-def round_trips_table(report: Row) -> str:
-    """Round-trip accuracy of each arm and space, with the causes of misses."""
-    groups = groupby(report["round_trips"], key=lambda each: (each["arm"], each["space"]))
-    rows, border = (list(group) for _, group in groups), report["meta"]["ill_conditioned"]
-    return markdown_table(table("round_trips", rows, ill_conditioned=border, exact_interval=exact_interval))
 
 
 def _plain(text: str) -> str:

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from er_il.evaluation.statistics import exact_interval
 from er_il.report.charts import bar_chart, curve_chart, percent_axis, where
 from er_il.report.style import BLUE, DOTTED, GREY, INK, LOOKS, RED, SKY, YELLOW, Look, label_of, styled
-from er_il.report.tables import markdown_table, table
-from er_il.report.text import sentences
+from er_il.report.tables import markdown_table
+from er_il.report.text import sentences, table
 
 Report = Mapping[str, Any]
 
@@ -71,7 +71,7 @@ def findings(report: Report) -> list[str]:
 
 def validity_table(report: Report) -> str:
     """Share of invalid actions of each space by cause, and what decoding costs; then the findings."""
-    shares = markdown_table(table("validity", summary(report).to_dict("records"), around=AROUND))
+    shares = markdown_table(table("validity", rows=summary(report).to_dict("records"), around=AROUND))
     return f"{shares}\n\n" + "\n".join(f"- {finding}" for finding in findings(report))
 
 

@@ -11,27 +11,17 @@ from matplotlib.figure import Figure
 
 from er_il.datasets.verification import Array, Verification
 from er_il.report.style import BLUE, GREEN, GREY, GRID, ORANGE, styled
-from er_il.report.tables import table
-from er_il.report.text import sentences
+from er_il.report.text import sentences, table
 from er_il.spaces.round_trip import EXACT, SINGULAR
 
 FLOOR = 1e-9  # [rad] errors below are drawn here: a logarithmic axis needs one
 WIDTH, HEIGHT = 10.0, 3.0  # [in] of a row
 SEPARATED = 60  # episodes at most between which lines are drawn
 
-# Key of an arm's report to its heading.
-ROWS = {
-    "flagged": "frames flagged",
-    "joint_error": "joint error [rad] p50, p95, p99, max",
-    "joint_error_unflagged": "joint error [rad] max, not flagged",
-    "position_error": "position error [m] p50, p95, p99, max",
-    "rotation_error": "rotation error [rad] p50, p95, p99, max",
-}
-
 
 def verification_texts(report: Mapping[str, Any]) -> pd.DataFrame:
-    """Texts of the summary, a row per key of :data:`ROWS`: its heading, and the value of each arm."""
-    return table("verification", ROWS.items(), arms=report["arms"])
+    """Texts of the summary, a row per measurement and a column per arm."""
+    return table("verification", report=report)
 
 
 def verification_notes(report: Mapping[str, Any]) -> list[str]:
