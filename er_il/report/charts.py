@@ -1,4 +1,8 @@
-"""The two charts of all reports: bars, and values over a number, both with intervals."""
+"""The two charts of all reports: bars, and values over a number, both with intervals.
+
+Their data have a row per bar or point: its ``group``, or its number ``x``; its ``series``, whose looks are given in
+drawing order; its ``value`` and, for an error bar, the bounds ``low`` and ``high``.
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -11,8 +15,9 @@ from numpy.typing import NDArray
 
 from er_il.report import paper
 from er_il.report.style import INK, Look, legend, looks_of, styled
+from er_il.report.text import Report
 
-Cells = Sequence[Mapping[str, Any]]
+Cells = Sequence[Report]
 Looks = Mapping[Any, Look]  # of the series, in drawing order
 
 GROUP_WIDTH = 0.8  # of the bars of a group, whose centres are 1 apart
@@ -29,17 +34,7 @@ def where(data: pd.DataFrame, **values: object) -> pd.DataFrame:
 
 
 def bar_chart(axis: Axes, data: pd.DataFrame, looks: Looks, *, stacked: bool = False) -> pd.DataFrame:
-    """Draw groups of bars.
-
-    Args:
-        axis: Where to draw.
-        data: A row per bar: ``group``, ``series``, ``value`` and, for an error bar, the bounds ``low`` and ``high``.
-        looks: The series in drawing order.
-        stacked: Whether the bars of a group stand upon each other, the first row's lowest, instead of side by side.
-
-    Returns:
-        The data with the bars' x coordinates, ``x``.
-    """
+    """Draw groups of bars, side by side or stacked with the first row's lowest; return the data with the bars' x."""
     at, groups = pd.factorize(data["group"])
     width = GROUP_WIDTH / (1 if stacked else len(looks))
     shift = 0 if stacked else (data["series"].map(list(looks).index) - (len(looks) - 1) / 2) * width
@@ -55,14 +50,7 @@ def bar_chart(axis: Axes, data: pd.DataFrame, looks: Looks, *, stacked: bool = F
 
 
 def curve_chart(axis: Axes, data: pd.DataFrame, looks: Looks, *, log: bool = False) -> None:
-    """Draw a line per series over a number.
-
-    Args:
-        axis: Where to draw.
-        data: A row per point: ``x``, ``series``, ``value`` and, for an error bar, the bounds ``low`` and ``high``.
-        looks: The series in drawing order.
-        log: Whether the number is on a logarithmic axis.
-    """
+    """Draw a line per series over a number, which may be on a logarithmic axis."""
     ticks = sorted(set(data["x"]))
     if log:
         axis.set_xscale("log", base=2)
@@ -91,12 +79,7 @@ def success_data(cells: Cells) -> pd.DataFrame:
 
 @styled
 def success_figure(cells: Cells, *, compared: bool = False) -> Figure:
-    """Success of each decoder on each task, with exact 95 % intervals.
-
-    Args:
-        cells: Reported cells.
-        compared: Whether to mark the paper's success rates.
-    """
+    """Success of each decoder on each task, with exact 95 % intervals and, if ``compared``, the paper's rates."""
     data = success_data(cells)
     looks, counted = looks_of(data["series"].unique()), len(data) <= COUNTED
     width = 1 + data["task"].nunique() * (0.4 + (0.55 if counted else 0.18) * len(looks))
@@ -109,13 +92,11 @@ def success_figure(cells: Cells, *, compared: bool = False) -> Figure:
         axis.set_ylim(top=114)
         for bar in bars:
             axis.annotate(f"{bar['successes']}/{bar['episodes']}", (bar["x"], 105), ha="center", fontsize=8)
-    published = {bar["x"]: paper.share(bar["task"], bar["series"]) for bar in bars if compared}
-    if marks := {x: 100 * share for x, share in published.items() if share is not None}:
-        style = {"color": "white", "markeredgecolor": INK, "zorder": 4}
-        axis.plot(
-            list(marks), list(marks.values()), "D", label=f"Paper, {paper.ROLLOUTS} rollouts on a real arm", **style
-        )
-    legend(figure, axis)
+    published = [(bar["x"], paper.share(bar["task"], bar["series"])) for bar in bars if compared]
+    if marks := [(x, 100 * share) for x, share in published if share is not None]:
+        label = f"Paper, {paper.ROLLOUTS} rollouts on a real arm"
+        axis.plot(*zip(*marks, strict=True), "D", color="white", markeredgecolor=INK, label=label, zorder=4)
+    legend(figure)
     return figure
 
 
@@ -131,12 +112,10 @@ def demonstrations_figure(cells: Cells) -> Figure:
         percent_axis(axis)
         axis.set(xlabel="Training demonstrations", title=task)
     axes[0].set_ylabel("Success rate [%]")
-    legend(figure, axes[0])
+    legend(figure)
     return figure
 
 
 def _spread(rows: pd.DataFrame) -> NDArray[np.float64] | None:
     """Lengths (2, N) of the error bars below and above the values, if they have bounds."""
-    if "low" not in rows:
-        return None
-    return np.abs(np.array([rows["value"] - rows["low"], rows["high"] - rows["value"]], dtype=float))
+    return rows[["low", "high"]].sub(rows["value"], axis="index").abs().to_numpy(float).T if "low" in rows else None

@@ -12,7 +12,6 @@ from er_il.report.tables import markdown_table
 from er_il.report.text import render, table
 
 TABLE, PAGE = "table.md", "README.md"
-BARS, CURVES = "table.png", "curves.png"
 
 
 def write_pages(folder: Path) -> None:
@@ -24,14 +23,15 @@ def write_pages(folder: Path) -> None:
     varied = len(grid["demonstrations"]) > 1
     compared = grid["arm"] == paper.ARM and any(task in paper.SUCCESSES for task in grid["tasks"])
     figure = demonstrations_figure(cells) if varied else success_figure(cells, compared=compared)
-    save(figure, folder / (CURVES if varied else BARS))
+    picture = "curves.png" if varied else "table.png"
+    save(figure, folder / picture)
     (folder / TABLE).write_text(markdown_table(table("success", **report)) + "\n")
     page = render(
         "grid.md.j2",
         meta=report["meta"],
         grid=grid,
         cells=cells,
-        figure=CURVES if varied else BARS,
+        figure=picture,
         compared=compared,
         marked=not varied and any(paper.share(*each) is not None for each in product(grid["tasks"], grid["decoders"])),
         # Version 0.1 wrote the posture baselines as sceptics.

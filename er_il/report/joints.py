@@ -1,9 +1,8 @@
 """The study of ERJ's joints: its figure, its table and what follows from it, rendered from its report alone."""
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from statistics import mean
-from typing import Any
 
 import pandas as pd
 from matplotlib.figure import Figure
@@ -11,9 +10,7 @@ from matplotlib.figure import Figure
 from er_il.report.charts import bar_chart, percent_axis
 from er_il.report.style import BLUE, GREEN, GREY, INK, ORANGE, OTHERS, PURPLE, RED, SKY, Look, legend, styled
 from er_il.report.tables import joined, markdown_table
-from er_il.report.text import sentences, table
-
-Report = Mapping[str, Any]
+from er_il.report.text import Report, sentences, table
 
 WORKSPACE = "workspace"  # the set of configurations beside the sets of demonstrations
 CROWDED = 10  # choices, above which labels stand upright
@@ -21,7 +18,7 @@ SMALLEST = 1e-4  # singular values below are drawn here: a logarithmic axis need
 COLOURS = (GREY, BLUE, ORANGE, GREEN, PURPLE, SKY, RED, *OTHERS)  # the workspace first, then the sets
 
 
-def measures(report: Report) -> dict[str, dict[str, Mapping[str, Any]]]:
+def measures(report: Report) -> dict[str, dict[str, Report]]:
     """Measures of each choice, by its name, over the workspace and along each set of demonstrations."""
     sets = {WORKSPACE: report["workspace"], **report["demos"]}
     return {name: {joined(each["joints"]): each for each in of_set} for name, of_set in sets.items()}
@@ -59,22 +56,29 @@ def joints_table(report: Report) -> str:
 @styled
 def joints_figure(report: Report) -> Figure:
     """Each choice of joints: self-motion, singularities, risk, round trips, playback and, if there, training."""
-    labels, settings = _labels(report), report["settings"]
-    sets = measures(report).items()
+    crowded, settings = len(report["workspace"]) > CROWDED, report["settings"]
+    labels = _labels(report, "{} ({})" if crowded else "{}\n{}")
     data = pd.DataFrame(
-        [{"series": series, "group": labels[name], **each} for series, of_set in sets for name, each in of_set.items()]
+        [{"series": name, **each} for name, of_set in measures(report).items() for each in of_set.values()]
     )
-    low, middle = (data[key].clip(lower=SMALLEST) for key in ("smallest_p05", "smallest_p50"))
+    data["group"] = data["joints"].map(joined).map(labels.get)
+    tested = [{"series": each["task"], **row} for each in report.get("training", []) for row in each["choices"]]
+    trained = pd.DataFrame(tested, columns=pd.Index(["series", "joints", "success", "interval"]))
+    flips = data.loc[data["series"] != WORKSPACE]
+    low, median = (data[key].clip(lower=SMALLEST) for key in ("smallest_p05", "smallest_p50"))
     seed, action = settings["seed_error_rad"], 1e3 * settings["playback_error_m"]
     panels = {
         "Share of the joint in the self-motion's speed": data.assign(value=data["self_motion"]),
-        "Smallest singular value (median, 5th percentile)": data.assign(value=middle, low=low, high=middle),
+        "Smallest singular value (median, 5th percentile)": data.assign(value=median, low=low, high=median),
         "Risk: near a singularity or joints lost [%]": data.assign(value=100 * data["risk"]),
         f"Round trips missed [%], seed error {seed} rad": data.assign(value=100 * data["missed"]),
-        f"Branch flips per demonstration, action error {action:.0f} mm": data.assign(value=data["flips"]).dropna(
-            subset="value"
+        f"Branch flips per demonstration, action error {action:.0f} mm": flips.assign(value=flips["flips"]),
+        "Success of ACT policies trained with it [%]": trained.assign(
+            group=trained["joints"].map(labels.get),
+            value=100 * trained["success"],
+            low=100 * trained["interval"].str[0],
+            high=100 * trained["interval"].str[1],
         ),
-        "Success of ACT policies trained with it [%]": _training(report, labels),
     }
     panels = {title: panel for title, panel in panels.items() if len(panel)}
     columns = -(-len(panels) // 2)
@@ -87,34 +91,19 @@ def joints_figure(report: Report) -> Figure:
         axis.set(title=title, xlabel="Commanded joint")
         if title.startswith(("Risk", "Success")):
             percent_axis(axis)
-        if _crowded(report):
+        if crowded:
             axis.tick_params("x", rotation=90, labelsize=6)
     for empty in axes[len(panels) :]:
         empty.set_axis_off()
     axes[1].set_yscale("log")
     axes[1].axhline(settings["singular"], color=INK, linestyle="--", linewidth=0.9)
-    legend(figure, *axes[: len(panels)], below=True)
+    legend(figure, below=True)
     best = joined(report["recommended"])
     figure.suptitle(f"Which joint should ERJ command on {report['arm']}? Recommended: {best}", x=0.01, ha="left")
     return figure
 
 
-def _training(report: Report, labels: Mapping[str, str]) -> pd.DataFrame:
-    """Success in percent of each task and choice that was trained."""
-    rows = [
-        {"series": each["task"], "group": labels[row["joints"]], "value": 100 * row["success"]}
-        | dict(zip(("low", "high"), (100 * bound for bound in row["interval"]), strict=True))
-        for each in report.get("training", [])
-        for row in each["choices"]
-    ]
-    return pd.DataFrame(rows)
-
-
-def _crowded(report: Report) -> bool:
-    return len(report["workspace"]) > CROWDED
-
-
-def _labels(report: Report) -> dict[str, str]:
+def _labels(report: Report, form: str) -> dict[str, str]:
     """Label of each choice: its joints without the common prefix, and whether they twist or bend."""
     alike = itertools.takewhile(lambda letters: len(set(letters)) == 1, zip(*report["joints"], strict=False))
     shared = len(list(alike))
@@ -122,6 +111,5 @@ def _labels(report: Report) -> dict[str, str]:
     for each in report["workspace"]:
         kinds = {"twists" if joint in report["twisting"] else "bends" for joint in each["joints"]}
         short = "+".join(joint[shared:] or joint for joint in each["joints"])
-        kind = kinds.pop() if len(kinds) == 1 else "mixed"
-        found[joined(each["joints"])] = f"{short} ({kind})" if _crowded(report) else f"{short}\n{kind}"
+        found[joined(each["joints"])] = form.format(short, kinds.pop() if len(kinds) == 1 else "mixed")
     return found

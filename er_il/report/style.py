@@ -5,10 +5,8 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import matplotlib as mpl
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -74,12 +72,14 @@ def styled[**P](draw: Callable[P, Figure]) -> Callable[P, Figure]:
     return drawn
 
 
-def legend(figure: Figure, *axes: Axes, below: bool = False) -> None:
-    """Put one legend of the labelled series of the axes above or below them, markers last."""
-    entries = {label: handle for axis in axes for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)}
+def legend(figure: Figure, *, below: bool = False) -> None:
+    """Put one legend of all labelled series above or below the axes, markers last."""
+    entries = {
+        label: handle for axis in figure.axes for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)
+    }
     labels = sorted(entries, key=lambda label: isinstance(entries[label], Line2D))
     rows = math.ceil(len(labels) / max(1, int(figure.get_figwidth() / LEGEND_WIDTH)))
-    place: Any = "outside lower left" if below else "outside upper left"
+    place = "outside lower left" if below else "outside upper left"
     figure.legend([entries[label] for label in labels], labels, loc=place, ncols=math.ceil(len(labels) / rows))
 
 

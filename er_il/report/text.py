@@ -1,6 +1,8 @@
 """Texts of the reports, rendered from the templates in ``er_il/report/templates``."""
 
 import re
+from collections.abc import Mapping
+from typing import Any
 
 import pandas as pd
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -10,6 +12,8 @@ from er_il.evaluation.statistics import exact_interval
 from er_il.report import paper
 from er_il.report.tables import markdown_table, read_rows
 from er_il.support.counts import tally
+
+Report = Mapping[str, Any]  # the JSON of a study or a grid, or a part of it
 
 _ENVIRONMENT = Environment(
     loader=PackageLoader("er_il.report"),

@@ -1,17 +1,15 @@
 """The report of a dataset's verification: round-trip errors and distance from singularities, frame by frame."""
 
 import itertools
-from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from er_il.datasets.verification import Array, Verification
+from er_il.datasets.verification import Array, Flags, Verification
 from er_il.report.style import BLUE, GREEN, GREY, GRID, ORANGE, styled
-from er_il.report.text import sentences, table
+from er_il.report.text import Report, sentences, table
 from er_il.spaces.round_trip import EXACT, SINGULAR
 
 FLOOR = 1e-9  # [rad] errors below are drawn here: a logarithmic axis needs one
@@ -19,12 +17,12 @@ WIDTH, HEIGHT = 10.0, 3.0  # [in] of a row
 SEPARATED = 60  # episodes at most between which lines are drawn
 
 
-def verification_texts(report: Mapping[str, Any]) -> pd.DataFrame:
+def verification_texts(report: Report) -> pd.DataFrame:
     """Texts of the summary, a row per measurement and a column per arm."""
     return table("verification", report=report)
 
 
-def verification_notes(report: Mapping[str, Any]) -> list[str]:
+def verification_notes(report: Report) -> list[str]:
     """Sentences on invalid frames, singularities and quaternion signs."""
     return sentences("verification.txt.j2", report=report)
 
@@ -32,37 +30,35 @@ def verification_notes(report: Mapping[str, Any]) -> list[str]:
 @styled
 def verification_figure(verification: Verification, title: str) -> Figure:
     """A row per arm: joint errors (flagged frames apart) and the smallest singular value."""
+    name, label = ("error", "Joint error [rad]") if verification.compared else ("position_error", "Position error [m]")
+    flagged, errors, smallest = map(verification.gathered, ("flagged", name, "conditioning"))
+    starts = np.cumsum([0, *(len(each.status) for each in verification.episodes)]).tolist()
     figure = Figure(figsize=(WIDTH, HEIGHT * len(verification.arms)))
     axes = figure.subplots(len(verification.arms), 2, squeeze=False)
-    starts = np.cumsum([0, *(len(each.status) for each in verification.episodes)]).tolist()
-    for arm, (label, (left, right)) in enumerate(zip(verification.arms, axes, strict=True)):
-        _draw_errors(left, verification, arm)
-        left.set_title(f"{label}: round trip")
-        _draw_conditioning(right, verification.gathered("conditioning")[arm], starts)
-        right.set_title(f"{label}: smallest singular value")
+    for arm, (arm_label, (left, right)) in enumerate(zip(verification.arms, axes, strict=True)):
         for axis in (left, right):
             axis.set(xlabel="Frame", xlim=(0, starts[-1]))
             for start in starts[1:-1] if len(starts) <= SEPARATED else ():
                 axis.axvline(start, color=GRID, linewidth=0.6, zorder=0)
+        _draw_errors(left, errors[arm], flagged[arm].astype(bool))
+        left.set(title=f"{arm_label}: round trip", ylabel=label)
+        _draw_conditioning(right, smallest[arm], starts)
+        right.set(title=f"{arm_label}: smallest singular value", ylabel="Metres and radians mixed")
     figure.suptitle(title)
     return figure
 
 
-def _draw_errors(axis: Axes, verification: Verification, arm: int) -> None:
-    flagged = verification.gathered("flagged")[arm].astype(bool)
-    name, label = ("error", "Joint error [rad]") if verification.compared else ("position_error", "Position error [m]")
-    errors = np.maximum(verification.gathered(name)[arm], FLOOR)
-    for chosen, colour, kind in ((~flagged, BLUE, "not flagged"), (flagged, ORANGE, "flagged")):
+def _draw_errors(axis: Axes, errors: Array, flagged: Flags) -> None:
+    for chosen, colour, label in ((~flagged, BLUE, "not flagged"), (flagged, ORANGE, "flagged")):
         if chosen.any():
-            frames = np.flatnonzero(chosen)
-            axis.plot(frames, errors[chosen], ".", markersize=2, color=colour, label=kind, rasterized=True)
+            frames, shown = np.flatnonzero(chosen), np.maximum(errors[chosen], FLOOR)
+            axis.plot(frames, shown, ".", markersize=2, color=colour, label=label, rasterized=True)
     axis.axhline(EXACT, color=GREY, linewidth=0.8, linestyle="--")
-    axis.set(yscale="log", ylabel=label)
+    axis.set_yscale("log")
     axis.legend(loc="upper right", markerscale=4)
 
 
 def _draw_conditioning(axis: Axes, smallest: Array, starts: list[int]) -> None:
-    axis.set_ylabel("Metres and radians mixed")
     if not np.all(np.isfinite(smallest)):
         axis.text(0.5, 0.5, "joint space: none", transform=axis.transAxes, ha="center")
         return
