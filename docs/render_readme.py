@@ -6,47 +6,46 @@ A block between ``<!-- results/NAME -->`` and ``<!-- /results/NAME -->`` is the 
 
 import json
 import re
-from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from er_il.evaluation.results import RESULTS
 from er_il.report.joints import joints_table
-from er_il.report.tables import (
-    compact_table,
-    deltas_table,
-    drift_table,
-    round_trips_table,
-    success_table,
-    training_time_table,
-)
+from er_il.report.tables import markdown_table
+from er_il.report.text import table
 from er_il.report.validity import validity_table
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 BLOCK = re.compile(r"(<!-- (results/\w+) -->\n).*?(<!-- /\2 -->)", re.DOTALL)
 
-# How a report is shown, by a key that only such reports have.
-TABLES: dict[str, Callable[[Mapping[str, Any]], str]] = {
-    "drives": drift_table,
-    "pooled": validity_table,
-    "workspace": joints_table,
-    "drifts": deltas_table,
-    "round_trips": round_trips_table,
-    "training_times": training_time_table,
-    "cells": lambda report: success_table(report["cells"]),
+# Template of a report's table, by a key that only such reports have.
+TABLES = {
+    "drives": "drift",
+    "drifts": "deltas",
+    "round_trips": "round_trips",
+    "training_times": "training_time",
+    "cells": "success",
 }
+
+
+def shown(report: dict[str, Any]) -> str:
+    """A report as Markdown."""
+    if "workspace" in report:
+        return joints_table(report)
+    if "pooled" in report:
+        return validity_table(report)
+    return markdown_table(table(next(name for key, name in TABLES.items() if key in report), **report))
 
 
 def rendered(text: str) -> str:
     """Return the text with every results block filled from its file."""
 
     def filled(block: re.Match[str]) -> str:
-        benchmark = ROOT / block[2] / RESULTS
-        if benchmark.exists():
-            return f"{block[1]}{compact_table(json.loads(benchmark.read_text()))}\n{block[3]}"
-        report = json.loads((ROOT / block[2] / "report.json").read_text())
-        return f"{block[1]}{next(table(report) for key, table in TABLES.items() if key in report)}\n{block[3]}"
+        grid, study = ROOT / block[2] / RESULTS, ROOT / block[2] / "report.json"
+        if grid.exists():
+            return f"{block[1]}{markdown_table(table('compact', **json.loads(grid.read_text())))}\n{block[3]}"
+        return f"{block[1]}{shown(json.loads(study.read_text()))}\n{block[3]}"
 
     return BLOCK.sub(filled, text)
 

@@ -29,7 +29,8 @@ from er_il.experiments.results import write_results
 from er_il.experiments.schedule import Schedule
 from er_il.policy.training import PRECISION
 from er_il.report.grid_page import write_pages
-from er_il.report.tables import compact_table
+from er_il.report.tables import markdown_table
+from er_il.report.text import table
 from er_il.support.errors import ErIlError, UnknownNameError
 
 PANDA = Arm.preset("panda")
@@ -258,7 +259,7 @@ def test_the_page_shows_what_was_counted(tmp_path: Path) -> None:
     write_pages(tmp_path)
     page = (tmp_path / "README.md").read_text()
     row = "| `reach_cup` | **200/200** (98.2% – 100.0%) | **199/200** (97.2% – 100.0%) | **3/200** (0.3% – 4.3%) |"
-    assert row in compact_table(report()) and row in page
+    assert row in markdown_table(table("compact", **report())) and row in page
     assert (tmp_path / "table.md").read_text() in page + "\n"
     assert "| collision 197 |" in page and "-98.5 (" in page
     for text in ("A title", "0123abc", "strip_reach_cup.png", "(table.png)", "training: bf16", "1.0 h", "0.5 h"):

@@ -14,7 +14,8 @@ from er_il.arms.urdf import generated_urdf
 from er_il.cli import main
 from er_il.experiments.studies.circle import LAPS, POSES, RADIUS, drive_all, study_circle, targets
 from er_il.report.circle import circle_figure
-from er_il.report.tables import drift_table
+from er_il.report.tables import markdown_table
+from er_il.report.text import table
 from er_il.support.errors import ArmError
 
 PANDA = Arm.preset("panda")
@@ -53,7 +54,7 @@ def test_the_command_writes_what_it_measured(
     assert [len(drive["drift"]) for drive in report["drives"]] == [LAPS] * 4
     assert (tmp_path / "new" / "circle.png").read_bytes()[:4] == b"\x89PNG"
     shown = capsys.readouterr().out
-    for drive, line in zip(report["drives"], drift_table(report).splitlines()[2:], strict=True):
+    for drive, line in zip(report["drives"], markdown_table(table("drift", **report)).splitlines()[2:], strict=True):
         drift = f"{100 * drive['drift'][-1]:.1f}"
         assert drift in shown
         assert f"| {drift} cm | " in line

@@ -3,27 +3,29 @@
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import av
 import numpy as np
+import pandas as pd
 import pytest
-from er_il.report.demo_page import CHART, write_page
 from figures import assert_readable, bars, error_bars, legend_of, points, ticks
 from matplotlib.image import imread
 from PIL import Image
 
 from er_il import Arm
-from er_il.datasets.verification import Checked, Verification
+from er_il.datasets.verification import CheckedEpisode, Verification
 from er_il.report.charts import demonstrations_figure, success_figure
 from er_il.report.films import PAUSE, WIDTH, Panel, Row, moments, strip_figure, write_animation, write_film, write_strip
 from er_il.report.grid_page import write_pages
 from er_il.report.joints import joints_figure
 from er_il.report.style import BAD, GOOD, LOOKS, OTHERS, looks_of
-from er_il.report.tables import compact_table, markdown_table, success_table, terminal_table
+from er_il.report.tables import markdown_table, terminal_table
+from er_il.report.text import table
 from er_il.report.validity import validity_figure
 from er_il.report.verification import verification_figure, verification_notes
-from er_il.spaces.action_space import make_action_space
 from er_il.spaces.layout import Layout
+from er_il.spaces.registry import make_arm_space
 
 RESULTS = Path(__file__).resolve().parents[1] / "results"
 
@@ -45,12 +47,10 @@ CELLS = [
         ("task-nearest", 0, 0.0, 0.071, {"collision": 48, "timeout": 2}),
     ]
 ]
-META = {
-    "git": "0123abc",
-    "versions": {"python": "3.12"},
-    "machine": {"processor": "a processor", "cores": 2},
-    "rollouts": 50,
-}
+
+
+def _success_table(cells: list[dict[str, Any]]) -> str:
+    return markdown_table(table("success", cells=cells))
 
 
 def pictures(count: int) -> list[np.ndarray]:
@@ -58,7 +58,7 @@ def pictures(count: int) -> list[np.ndarray]:
 
 
 def test_the_table_holds_every_count() -> None:
-    table = success_table(CELLS).splitlines()
+    table = _success_table(CELLS).splitlines()
     assert len(table) == 2 + len(CELLS)
     assert "| `reach_cup` | erj | **49/50** | 89.4% – 99.9% | timeout 1 | 12.5% |" in table[2]
     assert "| `reach_cup` | task-nearest | **0/50** | 0.0% – 7.1% | collision 48, timeout 2 |" in table[3]
@@ -67,46 +67,26 @@ def test_the_table_holds_every_count() -> None:
 def test_a_replay_s_table_says_how_often_the_leader_succeeded() -> None:
     leader = {"starts": 51, "dropped": {"no plan": 1}}
     replayed = {**CELLS[0], "leader": leader, "max_joint_deviation": 0.0123}
-    heading, _, row = success_table([replayed]).splitlines()
+    heading, _, row = _success_table([replayed]).splitlines()
     assert heading.startswith("| Task | Leader | Decoder |")
     assert "| 50/51, no plan 1 | erj |" in row
     assert "| 0.012 rad |" in row
 
 
-def test_the_page_is_rendered_from_the_json(tmp_path: Path) -> None:
-    (tmp_path / "report.json").write_text(json.dumps({"meta": META, "cells": CELLS}))
-    write_page(
-        tmp_path, "A title", "What was done.", {"The strip": "strip.png", "All": "all.webp", "A film": "erj.mp4"}
-    )
-    page = (tmp_path / "report.md").read_text()
-    for line in success_table(CELLS).splitlines():
-        assert line in page
-    for text in (
-        "0123abc",
-        "rollouts: 50",
-        "![The strip](strip.png)",
-        "![All](all.webp)",
-        "[A film](erj.mp4)",
-        f"]({CHART})",
-    ):
-        assert text in page
-    assert (tmp_path / CHART).read_bytes()[:4] == b"\x89PNG"
-
-
 def test_a_column_is_shown_where_a_cell_has_it() -> None:
     first, second = CELLS
-    heading, _, one, other = success_table([first, {**second, "elbow_error": 0.123}]).splitlines()
+    heading, _, one, other = _success_table([first, {**second, "elbow_error": 0.123}]).splitlines()
     assert heading.endswith("| Max. joint step | Mean elbow error |")
     assert one.endswith("| 0.123 rad | – |") and other.endswith("| 0.123 rad | 12.3 cm |")
     assert "Leader" not in heading and "Demonstrations" not in heading
     varied = [{**first, "demonstrations": count} for count in (4, 32)]
-    assert "| erj | 32 | **49/50** |" in success_table(varied).splitlines()[3]
+    assert "| erj | 32 | **49/50** |" in _success_table(varied).splitlines()[3]
 
 
 def test_the_terminals_table_is_markdowns_without_its_marks() -> None:
-    columns = {"`Name`": lambda row: f"**{row}**"}
-    assert markdown_table(["a"], columns).splitlines() == ["| `Name` |", "| --- |", "| **a** |"]
-    table = terminal_table(["a"], columns)
+    texts = pd.DataFrame({"`Name`": ["**a**"]})
+    assert markdown_table(texts).splitlines() == ["| `Name` |", "| --- |", "| **a** |"]
+    table = terminal_table(texts)
     assert [(column.header, list(column.cells)) for column in table.columns] == [("Name", ["a"])]
 
 
@@ -230,7 +210,7 @@ def test_a_grid_names_its_posture_baselines_or_as_version_0_1_its_sceptics(tmp_p
     assert "## Posture baselines" in page
     assert "sufficient on: `push_button_elbow` (`task-grasp`), `lift_cup` (`task-mean`, `task-grasp`)." in page
     assert "It is not sufficient on: `reach_cup`, `remove_cup`, `reach_remove_cup`, `retrieve_bear`." in page
-    assert compact_table(grid, ("joint", "task-mean", "task-grasp")) in page
+    assert markdown_table(table("compact", **grid, decoders=["joint", "task-mean", "task-grasp"])) in page
     grid["meta"]["grid"]["posture_baselines"] = grid["meta"]["grid"].pop("sceptics")
     (tmp_path / "results.json").write_text(json.dumps(grid))
     write_pages(tmp_path)
@@ -293,7 +273,7 @@ def test_a_strip_shows_every_row(tmp_path: Path) -> None:
 def verified(count: int) -> Verification:
     """Two episodes of an arm, the last frames of each flagged."""
     episodes = tuple(
-        Checked(
+        CheckedEpisode(
             number=number,
             status=np.full((count, 1), "ok"),
             error=np.full((count, 1), 1e-7) * np.arange(1, count + 1)[:, None],
@@ -304,8 +284,8 @@ def verified(count: int) -> Verification:
         )
         for number in range(2)
     )
-    layout = Layout.of_space(make_action_space("erj", Arm.preset("panda")))
-    return Verification(layout, episodes, compared=True, suspicions={}, other_side={})
+    layout = Layout.of_space(make_arm_space("erj", Arm.preset("panda")))
+    return Verification(layout, episodes, compared=True, findings={}, other_side={})
 
 
 def test_the_figure_of_a_verification_tells_flagged_frames_apart() -> None:

@@ -37,9 +37,9 @@ def advise(
 
     from er_il.cli.progress import make_progress
     from er_il.experiments.studies.joints import study_joints
-    from er_il.report.joints import joint_columns, joints_figure
+    from er_il.report.joints import choices_texts, joints_figure
     from er_il.report.style import save
-    from er_il.report.tables import terminal_table
+    from er_il.report.tables import joined, terminal_table
     from er_il.spaces.joint_choice import choices
     from er_il.support.atomic_files import write_json
     from er_il.support.provenance import provenance
@@ -57,7 +57,7 @@ def advise(
                 arm, demos, cores(), lambda done, total, bar=bar: progress.update(bar, completed=done, total=total)
             )
     for label, report in reports.items():
-        console.print(terminal_table(report["ranking"][:ROWS], joint_columns(report)))
+        console.print(terminal_table(choices_texts(report, list(map(joined, report["ranking"][:ROWS])))))
         if (more := len(report["ranking"]) - ROWS) > 0:
             console.print(f"and {more} more, with --json", highlight=False)
         for note in report["notes"]:

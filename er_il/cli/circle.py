@@ -19,15 +19,16 @@ def circle(*, arm: str = "panda", out: Path = Path("outputs/circle")) -> None:
     from er_il.arms.arm import Arm
     from er_il.experiments.studies.circle import study_circle
     from er_il.report.circle import circle_figure
-    from er_il.report.tables import drift_columns, terminal_table
+    from er_il.report.tables import terminal_table
+    from er_il.report.text import table
     from er_il.support.provenance import provenance
 
     console = Console()
     with console.status("Solving along the circle"):
         report = study_circle(Arm.preset(arm))
     report["meta"] = provenance() | report["meta"]
-    columns = {heading.replace("Elbow drift after lap", "Lap"): cell for heading, cell in drift_columns(report).items()}
-    table = terminal_table(report["drives"], columns)
-    table.title = "Elbow drift"
-    console.print(table)
+    texts = table("drift", **report)
+    shown = terminal_table(texts.rename(columns=lambda heading: heading.replace("Elbow drift after lap", "Lap")))
+    shown.title = "Elbow drift"
+    console.print(shown)
     write_study(report, out, console, {"circle.png": circle_figure})

@@ -105,9 +105,10 @@ def deltas(study: OmitArgPrefixes[StudyOptions]) -> None:
         study: Demonstrations and results.
     """
     from er_il.experiments.studies.deltas import study_deltas
-    from er_il.report.tables import DELTA_COLUMNS, terminal_table
+    from er_il.report.tables import terminal_table
+    from er_il.report.text import table
 
-    study.run("deltas", study_deltas, lambda report: [terminal_table(report["drifts"], DELTA_COLUMNS)])
+    study.run("deltas", study_deltas, lambda report: [terminal_table(table("deltas", **report))])
 
 
 Study = (

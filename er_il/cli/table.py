@@ -14,10 +14,10 @@ HEADINGS = ("Task", "Decoder", "Success", "95 % interval", "Failures", "Invalid 
 
 def results_table(cells: Sequence[Mapping[str, Any]]) -> "Table":
     """Reported cells, one a row."""
-    from er_il.report.tables import success_columns, terminal_table
+    from er_il.report.tables import terminal_table
+    from er_il.report.text import table
 
-    columns = success_columns(cells)
-    return terminal_table(cells, {heading: columns[heading] for heading in HEADINGS})
+    return terminal_table(table("success", cells=cells).reindex(columns=list(HEADINGS)))
 
 
 def write_study(

@@ -1,4 +1,8 @@
-"""The two charts of all reports: bars, and values over a number, both with intervals."""
+"""The two charts of all reports: bars, and values over a number, both with intervals.
+
+Their data have a row per bar or point: its ``group``, or its number ``x``; its ``series``, whose looks are given in
+drawing order; its ``value`` and, for an error bar, the bounds ``low`` and ``high``.
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -10,9 +14,11 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from er_il.report import paper
-from er_il.report.style import INK, Look, legend, looks_of, new_figure, styled
+from er_il.report.style import INK, Look, legend, looks_of, styled
+from er_il.report.text import Report
 
-Cells = Sequence[Mapping[str, Any]]
+Cells = Sequence[Report]
+Looks = Mapping[Any, Look]  # of the series, in drawing order
 
 GROUP_WIDTH = 0.8  # of the bars of a group, whose centres are 1 apart
 DODGE = 0.06  # shift between series that would hide each other: of the x axis, or octaves of a logarithmic one
@@ -27,49 +33,24 @@ def where(data: pd.DataFrame, **values: object) -> pd.DataFrame:
     return data
 
 
-def bar_chart(
-    axis: Axes, data: pd.DataFrame, looks: Mapping[str, Look], *, stacked: bool = False
-) -> dict[tuple[str, str], float]:
-    """Draw groups of bars.
-
-    Args:
-        axis: Where to draw.
-        data: A row per bar: ``group``, ``series``, ``value`` and, for an error bar, the bounds ``low`` and ``high``.
-        looks: The series in drawing order.
-        stacked: Whether the bars of a group stand upon each other instead of side by side.
-
-    Returns:
-        The x coordinate of each bar by group and series.
-    """
-    groups = list(dict.fromkeys(data["group"]))
+def bar_chart(axis: Axes, data: pd.DataFrame, looks: Looks, *, stacked: bool = False) -> pd.DataFrame:
+    """Draw groups of bars, side by side or stacked with the first row's lowest; return the data with the bars' x."""
+    at, groups = pd.factorize(data["group"])
     width = GROUP_WIDTH / (1 if stacked else len(looks))
-    top, positions = np.zeros(len(groups)), {}
-    for number, (series, look) in enumerate(looks.items()):
+    shift = 0 if stacked else (data["series"].map(list(looks).index) - (len(looks) - 1) / 2) * width
+    data = data.assign(x=at + shift, bottom=data.groupby("group")["value"].cumsum() - data["value"] if stacked else 0)
+    for series, look in looks.items():
         rows = where(data, series=series)
-        at = np.array([groups.index(group) for group in rows["group"]], dtype=int)
-        x = at + (0.0 if stacked else (number - (len(looks) - 1) / 2) * width)
-        bottom = top[at] if stacked else 0.0
-        axis.bar(x, rows["value"], 0.88 * width, bottom=bottom, color=look.colour, label=look.label, zorder=2)
-        top[at] += rows["value"]
-        if "low" in rows:
-            axis.errorbar(
-                x, rows["value"], yerr=_spread(rows), fmt="none", ecolor=INK, elinewidth=1, capsize=2, zorder=3
-            )
-        positions |= {(group, series): float(each) for group, each in zip(rows["group"], x, strict=True)}
+        style = {"color": look.colour, "label": look.label, "zorder": 2}
+        axis.bar(rows["x"], rows["value"], 0.88 * width, rows["bottom"], **style)
+        axis.errorbar(rows["x"], rows["value"], _spread(rows), fmt="none", ecolor=INK, elinewidth=1, capsize=2)
     axis.set_xticks(range(len(groups)), groups)
     axis.margins(x=0.02)
-    return positions
+    return data
 
 
-def curve_chart(axis: Axes, data: pd.DataFrame, looks: Mapping[str, Look], *, log: bool = False) -> None:
-    """Draw a line per series over a number.
-
-    Args:
-        axis: Where to draw.
-        data: A row per point: ``x``, ``series``, ``value`` and, for an error bar, the bounds ``low`` and ``high``.
-        looks: The series in drawing order.
-        log: Whether the number is on a logarithmic axis.
-    """
+def curve_chart(axis: Axes, data: pd.DataFrame, looks: Looks, *, log: bool = False) -> None:
+    """Draw a line per series over a number, which may be on a logarithmic axis."""
     ticks = sorted(set(data["x"]))
     if log:
         axis.set_xscale("log", base=2)
@@ -79,58 +60,43 @@ def curve_chart(axis: Axes, data: pd.DataFrame, looks: Mapping[str, Look], *, lo
         rows = where(data, series=series).sort_values("x")
         dodge = DODGE * (number - (len(looks) - 1) / 2)
         x = rows["x"] * 2**dodge if log else rows["x"] + dodge
-        spread = _spread(rows) if "low" in rows else None
-        options: Mapping[str, Any] = {"color": look.colour, "linestyle": look.line, "label": look.label}
-        axis.errorbar(x, rows["value"], yerr=spread, marker="o", capsize=2, elinewidth=1, **options)
+        style: Mapping[str, Any] = {"color": look.colour, "linestyle": look.line, "label": look.label}
+        axis.errorbar(x, rows["value"], _spread(rows), marker="o", capsize=2, elinewidth=1, **style)
 
 
-def percent_axis(axis: Axes, label: str = "") -> None:
+def percent_axis(axis: Axes) -> None:
     """Let the y axis go from 0 to 100 %."""
-    axis.set_ylim(-3, 104)
-    axis.set_yticks(range(0, 101, 25))
-    axis.set_ylabel(label)
+    axis.set(ylim=(-3, 104), yticks=range(0, 101, 25))
 
 
 def success_data(cells: Cells) -> pd.DataFrame:
     """Cells as data of the charts: success in percent, tasks as groups and decoders as series."""
-    bounds = 100 * np.array([cell["interval"] for cell in cells])
-    data = pd.DataFrame([{key: cell.get(key) for key in ("task", "decoder", "demonstrations")} for cell in cells])
-    data = data.rename(columns={"decoder": "series", "demonstrations": "x"})
-    data["group"] = data["task"].map(_label)
-    data["value"] = [100 * cell["successes"] / cell["episodes"] for cell in cells]
-    return data.assign(low=bounds[:, 0], high=bounds[:, 1])
+    data = pd.DataFrame(cells).rename(columns={"decoder": "series", "demonstrations": "x"})
+    low, high = 100 * np.array(data["interval"].tolist()).T
+    value = 100 * data["successes"] / data["episodes"]
+    return data.assign(group=data["task"].str.replace("_", " "), value=value, low=low, high=high)
 
 
 @styled
 def success_figure(cells: Cells, *, compared: bool = False) -> Figure:
-    """Success of each decoder on each task, with exact 95 % intervals.
-
-    Args:
-        cells: Reported cells.
-        compared: Whether to mark the paper's success rates.
-    """
+    """Success of each decoder on each task, with exact 95 % intervals and, if ``compared``, the paper's rates."""
     data = success_data(cells)
-    looks = looks_of(dict.fromkeys(data["series"]))
-    counted = len(cells) <= COUNTED
+    looks, counted = looks_of(data["series"].unique()), len(data) <= COUNTED
     width = 1 + data["task"].nunique() * (0.4 + (0.55 if counted else 0.18) * len(looks))
-    figure = new_figure(max(NARROWEST, width), 3.8)
+    figure = Figure(figsize=(max(NARROWEST, width), 3.8))
     axis = figure.subplots()
-    positions = bar_chart(axis, data, looks)
-    percent_axis(axis, "Success rate [%]")
+    bars = bar_chart(axis, data, looks).to_dict("records")
+    percent_axis(axis)
+    axis.set_ylabel("Success rate [%]")
     if counted:
         axis.set_ylim(top=114)
-        for cell in cells:
-            place = positions[_label(cell["task"]), cell["decoder"]], 105
-            axis.annotate(f"{cell['successes']}/{cell['episodes']}", place, ha="center", fontsize=8)
-    marks = [
-        (positions[_label(cell["task"]), cell["decoder"]], 100 * published)
-        for cell in cells
-        if compared and (published := paper.share(cell["task"], cell["decoder"])) is not None
-    ]
-    if marks:
+        for bar in bars:
+            axis.annotate(f"{bar['successes']}/{bar['episodes']}", (bar["x"], 105), ha="center", fontsize=8)
+    published = [(bar["x"], paper.share(bar["task"], bar["series"])) for bar in bars if compared]
+    if marks := [(x, 100 * share) for x, share in published if share is not None]:
         label = f"Paper, {paper.ROLLOUTS} rollouts on a real arm"
         axis.plot(*zip(*marks, strict=True), "D", color="white", markeredgecolor=INK, label=label, zorder=4)
-    legend(figure, axis)
+    legend(figure)
     return figure
 
 
@@ -138,21 +104,18 @@ def success_figure(cells: Cells, *, compared: bool = False) -> Figure:
 def demonstrations_figure(cells: Cells) -> Figure:
     """Success over the number of demonstrations, a panel per task and a line per decoder."""
     data = success_data(cells)
-    looks, tasks = looks_of(dict.fromkeys(data["series"])), list(dict.fromkeys(data["group"]))
-    figure = new_figure(1 + 3.4 * len(tasks), 3.8)
+    looks, tasks = looks_of(data["series"].unique()), data["group"].unique()
+    figure = Figure(figsize=(1 + 3.4 * len(tasks), 3.8))
     axes = figure.subplots(1, len(tasks), squeeze=False, sharey=True)[0]
     for task, axis in zip(tasks, axes, strict=True):
         curve_chart(axis, where(data, group=task), looks, log=True)
-        percent_axis(axis, "Success rate [%]" if task == tasks[0] else "")
+        percent_axis(axis)
         axis.set(xlabel="Training demonstrations", title=task)
-    legend(figure, axes[0])
+    axes[0].set_ylabel("Success rate [%]")
+    legend(figure)
     return figure
 
 
-def _label(task: str) -> str:
-    return task.replace("_", " ")
-
-
-def _spread(rows: pd.DataFrame) -> NDArray[np.float64]:
-    """Lengths (2, N) of the error bars below and above the values."""
-    return np.abs(np.array([rows["value"] - rows["low"], rows["high"] - rows["value"]], dtype=float))
+def _spread(rows: pd.DataFrame) -> NDArray[np.float64] | None:
+    """Lengths (2, N) of the error bars below and above the values, if they have bounds."""
+    return rows[["low", "high"]].sub(rows["value"], axis="index").abs().to_numpy(float).T if "low" in rows else None

@@ -1,8 +1,5 @@
 """The elbow on a circle: the arm after each lap by two solvers, and the elbow's drift of all, from the report alone."""
 
-from collections.abc import Mapping
-from typing import Any
-
 import matplotlib as mpl
 import numpy as np
 import pandas as pd
@@ -12,19 +9,15 @@ from mpl_toolkits.mplot3d import Axes3D
 
 from er_il.report.charts import curve_chart
 from er_il.report.style import BLUE, DASHED, LOOKS, RED, Look, styled
+from er_il.report.text import Report
 
-Report = Mapping[str, Any]
-
-LEROBOT = "lerobot"
 # Dashes show what lies below.
 LOOKS_OF = {
-    LEROBOT: Look("LeRobot's IK", RED),
+    "lerobot": Look("LeRobot's IK", RED),
     "task": Look("er_il, task space", LOOKS["joint"].colour, DASHED),
     "era": Look("er_il, ERA", LOOKS["era"].colour),
     "erj": Look("er_il, ERJ", LOOKS["erj"].colour, DASHED),
 }
-EYE = (26, -40)  # [deg] elevation and azimuth of the view
-SIZE = (11.5, 4.3)  # [in]
 
 
 @styled
@@ -33,8 +26,9 @@ def circle_figure(report: Report) -> Figure:
     drives = {drive["solver"]: drive for drive in report["drives"]}
     laps = report["meta"]["laps"]
     colours = mpl.colormaps["inferno_r"](np.linspace(0.25, 0.85, laps + 1))  # the start first
-    figure = Figure(figsize=SIZE)
-    titles = {LEROBOT: f"LeRobot {report['meta']['versions']['lerobot']}'s IK", "erj": "ERJ"}
+    figure = Figure(figsize=(11.5, 4.3))
+    figure.set_layout_engine("none")  # every part has its place
+    titles = {"lerobot": f"LeRobot {report['meta']['versions']['lerobot']}'s IK", "erj": "ERJ"}
     for column, (solver, title) in enumerate(titles.items()):
         axis = figure.add_axes((0.32 * column - 0.02, 0.0, 0.36, 0.98), projection="3d")
         assert isinstance(axis, Axes3D)
@@ -47,12 +41,9 @@ def circle_figure(report: Report) -> Figure:
     handles += [Line2D([], [], color=c, marker="o", linewidth=3, label=n) for c, n in zip(colours, names, strict=True)]
     figure.legend(handles=handles, ncols=len(handles), loc="lower left", columnspacing=1.2, handlelength=1.4)
     chart = figure.add_axes((0.72, 0.2, 0.27, 0.62))
-    rows = [
-        {"x": lap, "series": solver, "value": 100 * drift}
-        for solver, drive in drives.items()
-        for lap, drift in enumerate([0.0, *drive["drift"]])
-    ]
-    curve_chart(chart, pd.DataFrame(rows), LOOKS_OF)
+    drifts = pd.DataFrame({solver: [0.0, *drive["drift"]] for solver, drive in drives.items()})
+    data = (100 * drifts).rename_axis("x").reset_index().melt("x", var_name="series")
+    curve_chart(chart, data, LOOKS_OF)
     chart.set(xlabel="Laps", ylim=(-1, None), title="Elbow drift [cm]")
     chart.legend(loc="upper left")
     return figure
@@ -68,5 +59,5 @@ def _draw_arm(axis: Axes3D, drive: Report, circle: list[list[float]], colours: n
     axis.plot(*np.array(circle).T, color=BLUE, linewidth=2)
     axis.set(xlim=(-0.15, 0.65), ylim=(-0.5, 0.3), zlim=(0, 0.8))
     axis.set_box_aspect((1, 1, 1), zoom=1.3)  # pyright: ignore[reportArgumentType]  its stub says int
-    axis.view_init(*EYE)
+    axis.view_init(elev=26, azim=-40)
     axis.set_axis_off()

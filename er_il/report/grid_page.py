@@ -1,27 +1,17 @@
 """The page of a grid: its figure, tables, films and provenance, rendered from a folder's ``results.json``."""
 
 import json
-from collections.abc import Mapping
 from itertools import product
 from pathlib import Path
-from typing import Any
 
-from er_il.evaluation.results import EPISODES, REFERENCE, RESULTS
+from er_il.evaluation.results import EPISODES, RESULTS
 from er_il.report import paper
 from er_il.report.charts import demonstrations_figure, success_figure
 from er_il.report.style import save
-from er_il.report.tables import DIFFERENCE, compact_table, success_table
-from er_il.report.text import render
+from er_il.report.tables import markdown_table
+from er_il.report.text import render, table
 
 TABLE, PAGE = "table.md", "README.md"
-BARS, CURVES = "table.png", "curves.png"
-STRIPS = "strip_*.png"  # one a task
-ANIMATION = "rollouts.webp"
-FILMS = {".mp4": "film", ".rrd": "Rerun recording"}  # of a decoder
-
-MARGIN = 0.05  # a posture is sufficient if the paired difference to the reference is, at 95 %, above minus this
-
-Report = Mapping[str, Any]
 
 
 def write_pages(folder: Path) -> None:
@@ -32,54 +22,21 @@ def write_pages(folder: Path) -> None:
         return
     varied = len(grid["demonstrations"]) > 1
     compared = grid["arm"] == paper.ARM and any(task in paper.SUCCESSES for task in grid["tasks"])
-    marked = not varied and any(paper.share(*each) is not None for each in product(grid["tasks"], grid["decoders"]))
     figure = demonstrations_figure(cells) if varied else success_figure(cells, compared=compared)
-    save(figure, folder / (CURVES if varied else BARS))
-    (folder / TABLE).write_text(success_table(cells) + "\n")
-    baselines = posture_baselines(grid)
+    picture = "curves.png" if varied else "table.png"
+    save(figure, folder / picture)
+    (folder / TABLE).write_text(markdown_table(table("success", **report)) + "\n")
     page = render(
         "grid.md.j2",
         meta=report["meta"],
         grid=grid,
         cells=cells,
-        figure=CURVES if varied else BARS,
+        figure=picture,
         compared=compared,
-        marked=marked,
-        paper=paper,
-        reference=REFERENCE,
+        marked=not varied and any(paper.share(*each) is not None for each in product(grid["tasks"], grid["decoders"])),
+        # Version 0.1 wrote the posture baselines as sceptics.
+        baselines=grid["posture_baselines"] if "posture_baselines" in grid else grid["sceptics"],
         episodes=EPISODES,
-        margin=MARGIN,
-        table=compact_table(report),
-        every_cell=success_table(cells),
-        baselines_table=compact_table(report, (REFERENCE, *baselines)) if baselines else "",
-        sufficient=sufficient_postures(report) if baselines else {},
-        strips=sorted(path.stem for path in folder.glob(STRIPS)),
-        animation=ANIMATION if (folder / ANIMATION).exists() else "",
-        films=_films(folder, [*grid["decoders"], *baselines]),
+        files=sorted(path.name for path in folder.iterdir()),
     )
     (folder / PAGE).write_text(page)
-
-
-def posture_baselines(grid: Mapping[str, Any]) -> list[str]:
-    """The decoders of task space with a posture from the demonstrations; version 0.1 wrote them as ``sceptics``."""
-    return grid["posture_baselines"] if "posture_baselines" in grid else grid["sceptics"]
-
-
-def sufficient_postures(report: Report) -> dict[str, list[str]]:
-    """For each task with a paired difference: the posture baselines that do as well as the reference."""
-    found: dict[str, list[str]] = {}
-    for cell in report["cells"]:
-        if cell["decoder"] in posture_baselines(report["meta"]["grid"]) and DIFFERENCE in cell:
-            names = found.setdefault(cell["task"], [])
-            if cell[DIFFERENCE]["interval"][0] > -MARGIN:
-                names.append(cell["decoder"])
-    return found
-
-
-def _films(folder: Path, decoders: list[str]) -> dict[str, dict[str, str]]:
-    """Files in the folder by kind, of each decoder that was filmed."""
-    found = {
-        name: {kind: f"{name}{ending}" for ending, kind in FILMS.items() if (folder / f"{name}{ending}").exists()}
-        for name in decoders
-    }
-    return {name: files for name, files in found.items() if files}

@@ -3,19 +3,17 @@
 ARM = "panda"
 ROLLOUTS = 10
 
-# Task -> action space -> successes of ten. The paper has one decoder of task space, MoveIt with pick_ik.
+# Task -> decoder -> successes of ten. The paper has one decoder of task space, MoveIt with pick_ik.
 SUCCESSES = {
-    "reach_cup": {"joint": 10, "task": 0, "erj": 10},
-    "remove_cup": {"joint": 9, "task": 4, "erj": 8},
-    "reach_remove_cup": {"joint": 9, "task": 0, "erj": 9},
-    "retrieve_bear": {"joint": 10, "task": 0, "erj": 10},
-    "push_button_elbow": {"joint": 10, "task": 0, "erj": 10},
+    "reach_cup": {"joint": 10, "task-nearest": 0, "erj": 10},
+    "remove_cup": {"joint": 9, "task-nearest": 4, "erj": 8},
+    "reach_remove_cup": {"joint": 9, "task-nearest": 0, "erj": 9},
+    "retrieve_bear": {"joint": 10, "task-nearest": 0, "erj": 10},
+    "push_button_elbow": {"joint": 10, "task-nearest": 0, "erj": 10},
 }
-
-SPACE_OF = {"joint": "joint", "erj": "erj", "task-nearest": "task"}  # decoder here -> space there
 
 
 def share(task: str, decoder: str) -> float | None:
     """The paper's success rate of what a decoder stands for; None where the paper has none."""
-    successes = SUCCESSES.get(task, {}).get(SPACE_OF.get(decoder, ""))
+    successes = SUCCESSES.get(task, {}).get(decoder)
     return None if successes is None else successes / ROLLOUTS

@@ -5,10 +5,8 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import matplotlib as mpl
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -24,30 +22,8 @@ SKY, GREEN, PURPLE, ORANGE, RED, YELLOW, BLUE = (
 OTHERS = ("#332288", "#88CCEE", "#44AA99", "#117733", "#999933", "#DDCC77", "#CC6677", "#882255", "#AA4499")
 
 DOTTED, DASHED = (0, (1, 1.2)), (0, (3, 3))
+STYLE = Path(__file__).with_name("figures.mplstyle")
 LEGEND_WIDTH = 2.0  # [in] of a column of a legend
-
-RC: dict[Any, Any] = {
-    "figure.dpi": 130,
-    "font.size": 9,
-    "axes.titlesize": 9,
-    "axes.titlelocation": "left",
-    "axes.labelsize": 9,
-    "axes.edgecolor": INK,
-    "axes.labelcolor": INK,
-    "xtick.color": INK,
-    "ytick.color": INK,
-    "figure.titlesize": 11,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.grid.axis": "y",
-    "axes.axisbelow": True,
-    "grid.color": GRID,
-    "legend.fontsize": 8,
-    "legend.frameon": False,
-    "lines.markersize": 4,
-    "text.color": INK,
-}
 
 
 @dataclass(frozen=True)
@@ -88,7 +64,7 @@ def styled[**P](draw: Callable[P, Figure]) -> Callable[P, Figure]:
 
     @functools.wraps(draw)
     def drawn(*args: P.args, **kwargs: P.kwargs) -> Figure:
-        with mpl.rc_context(RC):
+        with mpl.rc_context(fname=STYLE):
             figure = draw(*args, **kwargs)
             figure.draw_without_rendering()  # ticks take their sizes only now
         return figure
@@ -96,17 +72,14 @@ def styled[**P](draw: Callable[P, Figure]) -> Callable[P, Figure]:
     return drawn
 
 
-def new_figure(width: float, height: float) -> Figure:
-    """An empty figure of a size in inches."""
-    return Figure(figsize=(width, height), layout="constrained")
-
-
-def legend(figure: Figure, *axes: Axes, below: bool = False) -> None:
-    """Put one legend of the labelled series of the axes above or below them, markers last."""
-    entries = {label: handle for axis in axes for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)}
+def legend(figure: Figure, *, below: bool = False) -> None:
+    """Put one legend of all labelled series above or below the axes, markers last."""
+    entries = {
+        label: handle for axis in figure.axes for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)
+    }
     labels = sorted(entries, key=lambda label: isinstance(entries[label], Line2D))
     rows = math.ceil(len(labels) / max(1, int(figure.get_figwidth() / LEGEND_WIDTH)))
-    place: Any = "outside lower left" if below else "outside upper left"
+    place = "outside lower left" if below else "outside upper left"
     figure.legend([entries[label] for label in labels], labels, loc=place, ncols=math.ceil(len(labels) / rows))
 
 
