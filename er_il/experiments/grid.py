@@ -2,8 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Self
 
 from pydantic import AliasChoices, Field, StrictInt, StrictStr, model_validator
 
@@ -11,7 +10,7 @@ from er_il.arms.arm import Arm
 from er_il.datasets.recipe import Recipe
 from er_il.envs.tasks import task_id
 from er_il.evaluation.posture_baselines import POSTURE_BASELINES, space_of
-from er_il.support.declaration import Declaration, declared, read_declaration
+from er_il.support.declaration import Declaration
 from er_il.support.errors import ErIlError, UnknownNameError
 from er_il.support.resources import data_dir
 
@@ -42,6 +41,9 @@ class Grid(Declaration):
         GridError: a value that no grid can have.
         UnknownNameError: unknown task, arm, decoder or posture baseline.
     """
+
+    noun = "grid"
+    error = GridError
 
     title: StrictStr
     tasks: Annotated[Names, Field(min_length=1)]
@@ -76,13 +78,9 @@ class Grid(Declaration):
                 raise GridError(f"{key} names {', '.join(twice)} twice.")
         self._check_images()
         for task in self.tasks:
-            recipe = self.recipe(task)
-            available = recipe.episodes - recipe.validation
-            if max(self.demonstrations) > available:
-                raise GridError(
-                    f"demonstrations holds {max(self.demonstrations)}, "
-                    f"but the recipe of {task} has {available} to train on."
-                )
+            recipe, most = self.recipe(task), max(self.demonstrations)
+            if most > (available := recipe.episodes - recipe.validation):
+                raise GridError(f"demonstrations holds {most}, but the recipe of {task} has {available} to train on.")
         return self
 
     def _check_images(self) -> None:
@@ -98,9 +96,8 @@ class Grid(Declaration):
 
     def recipe(self, task: str) -> Recipe:
         """Recipe of a task's demonstrations."""
-        recipe = Recipe.load(task, self.arm)
-        own = {"cameras": list(self.cameras.get(task, ())), "seed": self.recording_seed}
-        recipe = Recipe.from_dict(recipe.to_dict() | own)
+        cameras = self.cameras.get(task, ())
+        recipe = Recipe.load(task, self.arm).replaced(cameras=cameras, seed=self.recording_seed)
         return recipe if self.episodes is None else recipe.resized(self.episodes)
 
     def seeds_of(self, cell: Cell) -> tuple[int, ...]:
@@ -116,25 +113,3 @@ class Grid(Declaration):
             for count in self.demonstrations
             for name in (*self.decoders, *self.posture_baselines)
         )
-
-    @classmethod
-    def from_file(cls, path: Path) -> "Grid":
-        """Read a grid from a YAML file.
-
-        Raises:
-            GridError: the file is unreadable or no grid.
-        """
-        return read_declaration(path, "grid", GridError, cls.from_dict)
-
-    @classmethod
-    def from_dict(cls, values: object) -> "Grid":
-        """Build a grid from plain values, such as :meth:`to_dict` gives.
-
-        Raises:
-            GridError: keys are missing, unknown, or of the wrong type.
-        """
-        return declared(cls, values, "grid", GridError)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON or YAML."""
-        return self.model_dump(mode="json")
