@@ -104,7 +104,7 @@ def test_a_recipe_declares_the_randomisation_that_evaluation_has(name):
     task = type(gymnasium.make(task_id(name)).unwrapped)
     defaults = {
         key: parameter.default
-        for base in (*task.__mro__, *leader_class(task.task).__mro__)
+        for base in reversed([*task.__mro__, *leader_class(task.task).__mro__])  # a class overrides its bases
         if "__init__" in vars(base)
         for key, parameter in inspect.signature(base.__init__).parameters.items()
     }
