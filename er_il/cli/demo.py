@@ -30,9 +30,9 @@ def demo(
 
     from er_il.cli.benchmark import report
     from er_il.cli.progress import make_progress
-    from er_il.experiments.demo import TASK, demo_grid, run_demo
+    from er_il.experiments.demo import demo_grid, run_demo
 
-    folder = out or Path("outputs") / ("demo" if task == TASK else task)
+    folder = out or Path("outputs") / ("demo" if task == "reach_cup" else task)
     grid = demo_grid(task, seed, tuple(decoders.split(",")), rollouts, demonstrations, steps)
     console = Console()
     with make_progress(console) as progress:

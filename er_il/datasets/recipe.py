@@ -75,14 +75,6 @@ class Recipe(Declaration):
         recipe = cls.from_file(path)
         return recipe if arm is None else recipe.replaced(arm=arm)
 
-    def replaced(self, **changes: Any) -> "Recipe":
-        """Return the recipe with other values for some keys.
-
-        Raises:
-            DatasetError: a key is unknown, or a value is none that it can have.
-        """
-        return self.from_dict(dict(self) | changes)
-
     def resized(self, episodes: int) -> "Recipe":
         """Return the recipe for another number of episodes, the same share of them held out (rounded up)."""
         share = -(-episodes * self.validation // self.episodes)

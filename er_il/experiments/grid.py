@@ -8,7 +8,6 @@ from pydantic import AliasChoices, Field, StrictInt, StrictStr, model_validator
 
 from er_il.arms.arm import Arm
 from er_il.datasets.recipe import Recipe
-from er_il.envs.tasks import task_id
 from er_il.evaluation.posture_baselines import POSTURE_BASELINES, space_of
 from er_il.support.declaration import Declaration
 from er_il.support.errors import ErIlError, UnknownNameError
@@ -62,8 +61,6 @@ class Grid(Declaration):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        for task in self.tasks:
-            task_id(task)  # raises if unknown
         Arm.preset(self.arm)  # raises if unknown
         for name in self.posture_baselines:
             if name not in POSTURE_BASELINES:
@@ -77,7 +74,7 @@ class Grid(Declaration):
             if twice := sorted({str(value) for value in values if values.count(value) > 1}):
                 raise GridError(f"{key} names {', '.join(twice)} twice.")
         self._check_images()
-        for task in self.tasks:
+        for task in self.tasks:  # raises if unknown
             recipe, most = self.recipe(task), max(self.demonstrations)
             if most > (available := recipe.episodes - recipe.validation):
                 raise GridError(f"demonstrations holds {most}, but the recipe of {task} has {available} to train on.")
@@ -103,6 +100,11 @@ class Grid(Declaration):
     def seeds_of(self, cell: Cell) -> tuple[int, ...]:
         """Training seeds whose policies a cell rolls out: all, but of a posture baseline only the first."""
         return self.training_seeds[:1] if cell.decoder in POSTURE_BASELINES else self.training_seeds
+
+    @property
+    def spaces(self) -> tuple[str, ...]:
+        """The action spaces of its policies."""
+        return tuple(dict.fromkeys(space_of(name) for name in (*self.decoders, *self.posture_baselines)))
 
     @property
     def cells(self) -> tuple[Cell, ...]:

@@ -46,6 +46,14 @@ class Declaration(BaseModel):
         except ValidationError as cause:
             raise cls.error(_message(cause, noun, cls.model_fields)) from cause
 
+    def replaced(self, **changes: Any) -> Self:
+        """Return the declaration with other values for some keys.
+
+        Raises:
+            ErIlError: of the class's kind: a key is unknown, or a value is none that it can have.
+        """
+        return self.from_dict(dict(self) | changes)
+
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON or YAML."""
         return self.model_dump(mode="json")
