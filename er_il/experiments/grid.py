@@ -115,3 +115,28 @@ class Grid(Declaration):
             for count in self.demonstrations
             for name in (*self.decoders, *self.posture_baselines)
         )
+
+
+def demo_grid(
+    task: str, seed: int, decoders: tuple[str, ...], rollouts: int, demonstrations: int | None, steps: int | None
+) -> Grid:
+    """Return the grid of ``configs/demo.yaml`` with other values, which are those of ``er-il demo``.
+
+    Raises:
+        GridError: a number is too small.
+        UnknownNameError: unknown task or decoder.
+    """
+    grid, recipe = Grid.from_file(data_dir("configs") / "demo.yaml"), Recipe.load(task)
+    if demonstrations is not None:
+        recipe = recipe.resized(demonstrations)
+    return grid.replaced(
+        title=f"{grid.title}: {task}",
+        tasks=(task,),
+        decoders=decoders,
+        training_seeds=(seed,),
+        recording_seed=seed,
+        rollouts=rollouts,
+        demonstrations=(recipe.episodes - recipe.validation,),
+        episodes=demonstrations,
+        steps=steps,
+    )
