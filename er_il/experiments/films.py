@@ -26,9 +26,9 @@ STRIP, ANIMATION = "strip_{}.png", "rollouts.webp"  # of a task, among the resul
 COLLISION = "collision"  # how the failures begin that a film shows best
 
 
-def films(plan: Plan, decoders: Sequence[str]) -> list[list[Film]]:
+def films(plan: Plan, decoders: Sequence[str]) -> dict[str, list[Film]]:
     """The films of each task whose cells with these decoders are complete."""
-    grid, complete, found = plan.grid, plan.complete, []
+    grid, complete, found = plan.grid, plan.complete, {}
     count, training_seed = max(grid.demonstrations), grid.training_seeds[0]
     names = [name for name in decoders if name in grid.decoders]
     for task in grid.tasks if names else ():
@@ -37,12 +37,10 @@ def films(plan: Plan, decoders: Sequence[str]) -> list[list[Film]]:
             seed = telling_seed(plan.rollouts(*cells).query("training_seed == @training_seed"))
             trainings = [plan.training(cell, training_seed) for cell in cells]
             folder = plan.out / "films" / task / f"{trainings[0].path.stem}-start-{seed}"
-            found.append(
-                [
-                    Film(folder / f"{name}.npz", f"film {task} through {name} from {seed}", (trained,), 1, name, seed)
-                    for name, trained in zip(names, trainings, strict=True)
-                ]
-            )
+            found[task] = [
+                Film(folder / f"{name}.npz", f"film {task} through {name} from {seed}", (trained,), 1, name, seed)
+                for name, trained in zip(names, trainings, strict=True)
+            ]
     return found
 
 
@@ -54,12 +52,11 @@ def telling_seed(rollouts: pd.DataFrame) -> int:
     return int(tells.groupby(rollouts["seed"]).sum().idxmax())  # pyright: ignore[reportArgumentType]
 
 
-def show(of_task: Sequence[Film], folder: Path, with_films: bool) -> None:
+def show(task: str, of_task: Sequence[Film], folder: Path, with_films: bool) -> None:
     """Put a strip of pictures of a task's films among the results; with an animation and the films if wanted."""
     panels = [_panel(film) for film in of_task]
     rows = [Row(each.title, each.outcome, each.success, _moments(each.film)) for each in panels]
-    (trained,) = of_task[0].needs
-    write_atomically(folder / STRIP.format(trained.task), lambda path: _write_strip(rows, path))
+    write_atomically(folder / STRIP.format(task), lambda path: _write_strip(rows, path))
     if with_films:
         for path in chain.from_iterable(film.files for film in of_task):
             shutil.copy2(path, folder)

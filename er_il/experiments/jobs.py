@@ -60,9 +60,8 @@ class Train(Job):
     The result is notes (JSON) on the policy's cost and origin; the training is in the folder of that name beside.
     """
 
-    task: str
+    needs: tuple[Demonstrate]
     space: str
-    dataset: Path
     seed: int
     demonstrations: int  # the first ones of the training episodes
     configuration: str  # kind of the shipped one, such as images_small; from states if empty
@@ -72,8 +71,10 @@ class Train(Job):
     @property
     def training(self) -> Training:
         """The training; the dataset must be there."""
+        (demonstrated,) = self.needs
+        task, dataset = demonstrated.recipe.task, demonstrated.path / self.space
         out, config = self.path.with_suffix(""), default_config(self.space, self.configuration)
-        return Training(self.task, self.space, self.dataset, out, config, self.size, self.seed, self.demonstrations)
+        return Training(task, self.space, dataset, out, config, self.size, self.seed, self.demonstrations)
 
     @property
     def progress(self) -> int:
@@ -103,13 +104,13 @@ class RollOut(Job):
     stage = "Roll out"
 
     def run(self) -> None:
-        (trained,) = self.needs
-        leader, elbow = _demonstrated(trained.dataset, trained.demonstrations)
+        training = self.needs[0].training
+        leader, elbow = _demonstrated(training)
         posture = POSTURE_BASELINES.get(self.decoder)
         with measured() as cost:
             rollouts = evaluate(
-                trained.training.policy,
-                trained.task,
+                training.policy,
+                training.task,
                 POSTURE_DECODER if posture else self.decoder,
                 episodes=self.size,
                 seed=self.first_seed,
@@ -137,22 +138,19 @@ class Film(Job):
     def run(self) -> None:
         from er_il.viewer import save_rollout
 
-        (trained,) = self.needs
-        film, recording, path = self.files
-        policy = trained.training.policy
-        trace, pictures = record_rollout(policy, trained.task, self.decoder, self.seed, FILM_EVERY)
+        training, (film, recording, path) = self.needs[0].training, self.files
+        trace, pictures = record_rollout(training.policy, training.task, self.decoder, self.seed, FILM_EVERY)
         write_film(pictures, film, round(1 / trace.period / FILM_EVERY))
         save_rollout(trace, recording)
         trace.save(path)
 
 
 @lru_cache(maxsize=4)  # jobs of one policy follow one another
-def _demonstrated(dataset: Path, count: int) -> tuple[list[NDArray[np.float64]], ElbowReference | None]:
+def _demonstrated(training: Training) -> tuple[list[NDArray[np.float64]], ElbowReference | None]:
     """The leader's paths (T, n + 1) [rad and opening] that a policy was trained on, and where the elbow was."""
-    info = dataset_info(dataset)
+    info, episodes = dataset_info(training.dataset), read_episodes(training.dataset)
     arm = arm_space_from_spec(action_spec(info["features"])).arm
-    episodes = read_episodes(dataset)
-    chosen = [episodes[i] for i in train_episodes(info)[:count]]
+    chosen = [episodes[i] for i in train_episodes(info)[: training.demonstrations]]
     followed = [demo.state[:, : arm.dof].astype(np.float64) for demo in chosen]
     leader = [demo.leader.astype(np.float64) for demo in chosen]
     return leader, ElbowReference.of_demos(arm, 1 / info["fps"], followed)

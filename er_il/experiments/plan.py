@@ -85,17 +85,15 @@ class Plan:
     def training(self, cell: Cell, seed: int) -> Train:
         """The training of a cell's policy."""
         task, space, count = cell.task, space_of(cell.decoder), cell.demonstrations
-        demonstrate, configuration = self._demonstrations[task], self.grid.configuration
+        configuration = self.grid.configuration
         steps = self.grid.steps or default_steps(default_config(space, configuration))
         variant = f"{count}-demonstrations-{steps}-steps-seed-{seed}"
         return Train(
             self.out / "policies" / task / space / f"{variant}.json",
             f"train {task} {space} on {count} demonstrations, seed {seed}",
-            (demonstrate,),
+            (self._demonstrations[task],),
             size=steps,
-            task=task,
             space=space,
-            dataset=demonstrate.path / space,
             seed=seed,
             demonstrations=count,
             configuration=configuration,

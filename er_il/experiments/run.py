@@ -50,11 +50,11 @@ def run(plan: Plan, executor: Executor, progress: Progress, folder: Path, with_f
         _run(schedule, executor, progress, _announcing(plan, schedule, progress))
         report = write_results(plan, folder)
         filming = films(plan, plan.grid.decoders if with_films else FILMED)
-        recording = Schedule(chain(*filming))
+        recording = Schedule(chain(*filming.values()))
         _run(recording, executor, progress)
-        for of_task in filming:
+        for task, of_task in filming.items():
             if recording.done.issuperset(of_task):
-                show(of_task, folder, with_films)
+                show(task, of_task, folder, with_films)
         write_pages(folder)
     return Outcome(report, tuple(schedule.failed.values()), tuple(recording.failed.values()))
 
