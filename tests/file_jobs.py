@@ -12,25 +12,25 @@ from typing import Any
 import gymnasium
 
 import sim_tasks  # noqa: F401  registers the tasks
-from er_il.experiments.schedule import FileResult
+from er_il.experiments.schedule import Job
 from er_il.support.atomic_files import write_atomically
 
 
 @dataclass(frozen=True)
-class FileJob(FileResult):
+class FileJob(Job):
     """Writes what it computed from its seed and from the files it needs."""
 
-    path: Path
-    seed: int = 0
+    name: str = field(init=False)
     needs: "tuple[FileJob, ...]" = ()
+    size: int = 1
+    seed: int = 0
     accident: str = ""  # "fail": raises; "die": kills its process the first time
     sleep: float = 0.0  # [s]
 
     stage = "Compute"
 
-    @property
-    def name(self) -> str:
-        return self.path.stem
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", self.path.stem)  # frozen, as all jobs are
 
     @property
     def runs(self) -> int:
@@ -84,7 +84,7 @@ def graph(folder: Path, **changes: str) -> list[FileJob]:
     folder.mkdir(parents=True, exist_ok=True)
 
     def job(name: str, seed: int, *needs: FileJob) -> FileJob:
-        return FileJob(folder / f"{name}.json", seed, needs, accident=changes.get(name, ""), sleep=0.2)
+        return FileJob(folder / f"{name}.json", needs, seed=seed, accident=changes.get(name, ""), sleep=0.2)
 
     root = job("root", 5)
     return [job("a", 1, root), job("b", 2, root), job("c", 3), job("d", 4)]

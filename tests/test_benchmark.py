@@ -25,7 +25,7 @@ from er_il.evaluation.rollouts import Rollout
 from er_il.experiments.films import telling_seed
 from er_il.experiments.grid import Cell, Grid, GridError
 from er_il.experiments.plan import Plan
-from er_il.experiments.results import write_results
+from er_il.experiments.run import write_results
 from er_il.experiments.schedule import Schedule
 from er_il.policy.training import PRECISION
 from er_il.report.grid_page import write_pages
@@ -96,7 +96,7 @@ def test_mistakes_in_a_grid_name_the_valid_choices(tmp_path: Path) -> None:
         Grid.from_file(tmp_path / "grid.yaml")
 
 
-@pytest.mark.parametrize("name", ["table1", "data_efficiency", "images", "panda8"])
+@pytest.mark.parametrize("name", ["demo", "table1", "data_efficiency", "images", "panda8"])
 def test_the_shipped_grids_are_grids(name: str) -> None:
     shipped = Grid.from_file(Path(__file__).parents[1] / "configs" / f"{name}.yaml")
     assert Grid.from_dict(shipped.to_dict()) == shipped
@@ -118,10 +118,10 @@ def test_jobs_differ_wherever_their_results_may(tmp_path: Path) -> None:
     )
     jobs = Plan(wide, tmp_path).jobs
     assert len({job.path for job in jobs}) == len({job.name for job in jobs}) == len(jobs) == (3 * 2 + 1) * 3
-    assert sorted((job.first_seed, job.count) for job in jobs[:3]) == [(1000, 25), (1025, 25), (1050, 10)]
-    trained = {job.decoder: job.trained for job in jobs if job.trained.seed == 0}
+    assert sorted((job.first_seed, job.size) for job in jobs[:3]) == [(1000, 25), (1025, 25), (1050, 10)]
+    trained = {job.decoder: job.needs for job in jobs if job.needs[0].seed == 0}
     assert trained["task-nearest"] == trained["task-posture"] == trained["task-mean"] != trained["joint"]
-    assert [job.decoder for job in jobs if job.trained.seed == 1].count("task-mean") == 0  # first seed only
+    assert [job.decoder for job in jobs if job.needs[0].seed == 1].count("task-mean") == 0  # first seed only
     other = Plan(grid(steps=3), tmp_path).jobs
     assert not {job.path for job in other} & {job.path for job in jobs}
 
@@ -307,7 +307,7 @@ def test_a_grid_from_end_to_end(
     file.parent.mkdir()
     file.write_text(yaml.safe_dump(TINY | short))
     claim(grid(**short), out)
-    in_the_way = Plan(grid(**short), out).training(Cell(TASK, "task-nearest", 1), 0).out / "thesis.tex"
+    in_the_way = Plan(grid(**short), out).training(Cell(TASK, "task-nearest", 1), 0).path.with_suffix("") / "thesis.tex"
     in_the_way.parent.mkdir(parents=True)
     in_the_way.touch()
 

@@ -8,8 +8,7 @@ import pytest
 from documented import documented
 
 from er_il.cli import main
-from er_il.experiments.demo import demo_grid
-from er_il.experiments.grid import GridError
+from er_il.experiments.grid import GridError, demo_grid
 from er_il.support.errors import UnknownNameError
 
 SMALL = {"decoders": "erj,task-nearest", "demonstrations": "2", "steps": "2", "rollouts": "2"}

@@ -93,7 +93,7 @@ def test_killed_it_resumes_where_it_was(tmp_path: Path) -> None:
         "from er_il.support.workers import LocalExecutor\n"
         "if __name__ == '__main__':\n"
         "    with LocalExecutor(1) as executor:\n"
-        "        Schedule([FileJob(Path(sys.argv[1]) / f'{i}.json', i, sleep=60 * (i == 2)) for i in range(4)])"
+        "        Schedule([FileJob(Path(sys.argv[1]) / f'{i}.json', seed=i, sleep=60 * (i == 2)) for i in range(4)])"
         ".run(executor)\n"
     )
     (tmp_path / "script.py").write_text(script)
@@ -109,7 +109,7 @@ def test_killed_it_resumes_where_it_was(tmp_path: Path) -> None:
     while Path(f"/proc/{worker}").exists() and time.monotonic() < deadline:
         time.sleep(0.1)
     assert not Path(f"/proc/{worker}").exists()  # or it would write beside its successor
-    jobs = [FileJob(tmp_path / f"{i}.json", i) for i in range(4)]
+    jobs = [FileJob(tmp_path / f"{i}.json", seed=i) for i in range(4)]
     assert [job.done for job in jobs] == [True, True, False, False]
     Schedule(jobs).run(InOrder())
     assert [job.runs for job in jobs] == [1, 1, 2, 1]

@@ -29,12 +29,18 @@ def demo(
     from rich.console import Console
 
     from er_il.cli.benchmark import report
-    from er_il.cli.progress import make_progress
-    from er_il.experiments.demo import TASK, demo_grid, run_demo
+    from er_il.experiments.grid import demo_grid
 
-    folder = out or Path("outputs") / ("demo" if task == TASK else task)
+    # Seconds of imports follow: mistakes are told before.
     grid = demo_grid(task, seed, tuple(decoders.split(",")), rollouts, demonstrations, steps)
-    console = Console()
-    with make_progress(console) as progress:
-        outcome = run_demo(grid, folder, progress)
+    from er_il.cli.progress import make_progress
+    from er_il.experiments.plan import Plan
+    from er_il.experiments.run import run
+    from er_il.support.workers import LocalExecutor, cores
+
+    folder, console = out or Path("outputs") / ("demo" if task == "reach_cup" else task), Console()
+    plan = Plan(grid, folder.resolve(), recorders=cores())
+    # All trainings at once, be they more than the cores: in turns, a core would idle beside the last.
+    with LocalExecutor(max(cores(), len(grid.spaces))) as executor, make_progress(console) as progress:
+        outcome = run(plan, executor, progress, folder, with_films=True)
     report(console, outcome, folder)

@@ -2,12 +2,11 @@
 
 from collections.abc import Iterator, Mapping
 from itertools import count
-from pathlib import Path
 from typing import Annotated, Any, Self
 
 from pydantic import Field, StrictFloat, StrictInt, StrictStr, field_validator, model_validator
 
-from er_il.support.declaration import Declaration, declared, read_declaration
+from er_il.support.declaration import Declaration
 from er_il.support.errors import DatasetError, UnknownNameError
 from er_il.support.resources import data_dir
 
@@ -27,6 +26,9 @@ class Recipe(Declaration):
 
     Build it by :meth:`from_dict` or :meth:`replaced`, which refuse wrong values with a DatasetError.
     """
+
+    noun = "recipe"
+    error = DatasetError
 
     task: StrictStr
     episodes: Annotated[StrictInt, Field(ge=1, le=DEMOS_PER_SEED)]  # successful demos, with those for validation
@@ -72,36 +74,6 @@ class Recipe(Declaration):
             raise UnknownNameError("task", task, recipe_names())
         recipe = cls.from_file(path)
         return recipe if arm is None else recipe.replaced(arm=arm)
-
-    @classmethod
-    def from_file(cls, path: Path) -> "Recipe":
-        """Read a recipe from a YAML (or JSON) file.
-
-        Raises:
-            DatasetError: the file is unreadable or no recipe.
-        """
-        return read_declaration(path, "recipe", DatasetError, cls.from_dict)
-
-    @classmethod
-    def from_dict(cls, values: object) -> "Recipe":
-        """Build a recipe from plain values, such as :meth:`to_dict` gives.
-
-        Raises:
-            DatasetError: keys are missing, unknown, or of the wrong type.
-        """
-        return declared(cls, values, "recipe", DatasetError)
-
-    def replaced(self, **changes: Any) -> "Recipe":
-        """Return the recipe with other values for some keys.
-
-        Raises:
-            DatasetError: a key is unknown, or a value is none that it can have.
-        """
-        return self.from_dict(dict(self) | changes)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON or YAML."""
-        return self.model_dump(mode="json")
 
     def resized(self, episodes: int) -> "Recipe":
         """Return the recipe for another number of episodes, the same share of them held out (rounded up)."""

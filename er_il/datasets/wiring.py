@@ -13,7 +13,7 @@ from er_il.spaces.layout import Layout, Part
 from er_il.spaces.motors import Motors
 from er_il.spaces.registry import make_arm_space
 from er_il.spaces.spec import ACTION
-from er_il.support.declaration import Declaration, declared, read_declaration
+from er_il.support.declaration import Declaration, read_declaration
 from er_il.support.errors import ArmError, DatasetError, UnknownNameError
 
 Names = tuple[StrictStr, ...]
@@ -24,6 +24,9 @@ SUFFIX = ".pos"  # LeRobot's name for the position of a motor
 
 class Wiring(Declaration):
     """One arm: its kinematics, and the dimensions that hold its joints. Empty values are guessed or left out."""
+
+    noun = "wiring"
+    error = DatasetError
 
     arm: StrictStr  # preset, or path of a URDF
     label: StrictStr = ""
@@ -120,7 +123,7 @@ def _wirings(entries: object, folder: Path) -> list[Wiring]:
         arm = values.get("arm")
         if isinstance(arm, str) and arm not in PRESETS and (folder / arm).is_file():
             values["arm"] = str(folder / arm)
-        found.append(declared(Wiring, values, f"wiring of arm {label!r}", DatasetError))
+        found.append(Wiring.from_dict(values, f"wiring of arm {label!r}"))
     return found
 
 

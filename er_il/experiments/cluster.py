@@ -13,9 +13,7 @@ RETRIES = 3  # of a job whose process or machine died under it
 
 
 class RayExecutor:
-    """Runs functions on a Ray cluster, each on one core; Ray runs those again whose machine died.
-
-    Use it in a ``with`` statement.
+    """Runs functions on a Ray cluster in a ``with`` statement, each on one core; again if their machine died.
 
     Raises:
         ErIlError: Ray is not installed, or there is no cluster at the address.

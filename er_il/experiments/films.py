@@ -3,6 +3,7 @@
 import shutil
 from collections.abc import Sequence
 from contextlib import closing
+from itertools import chain
 from pathlib import Path
 
 import av
@@ -29,14 +30,17 @@ def films(plan: Plan, decoders: Sequence[str]) -> dict[str, list[Film]]:
     """The films of each task whose cells with these decoders are complete."""
     grid, complete, found = plan.grid, plan.complete, {}
     count, training_seed = max(grid.demonstrations), grid.training_seeds[0]
-    for task in grid.tasks:
-        cells = [Cell(task, name, count) for name in decoders if name in grid.decoders]
-        if cells and all(cell in complete for cell in cells):
+    names = [name for name in decoders if name in grid.decoders]
+    for task in grid.tasks if names else ():
+        cells = [Cell(task, name, count) for name in names]
+        if all(cell in complete for cell in cells):
             seed = telling_seed(plan.rollouts(*cells).query("training_seed == @training_seed"))
             trainings = [plan.training(cell, training_seed) for cell in cells]
-            folder = plan.out / "films" / task / f"{trainings[0].out.name}-start-{seed}"
-            pairs = zip(cells, trainings, strict=True)
-            found[task] = [Film(trained, cell.decoder, seed, folder / f"{cell.decoder}.npz") for cell, trained in pairs]
+            folder = plan.out / "films" / task / f"{trainings[0].path.stem}-start-{seed}"
+            found[task] = [
+                Film(folder / f"{name}.npz", f"film {task} through {name} from {seed}", (trained,), 1, name, seed)
+                for name, trained in zip(names, trainings, strict=True)
+            ]
     return found
 
 
@@ -48,35 +52,28 @@ def telling_seed(rollouts: pd.DataFrame) -> int:
     return int(tells.groupby(rollouts["seed"]).sum().idxmax())  # pyright: ignore[reportArgumentType]
 
 
-def show_strip(of_task: Sequence[Film], folder: Path) -> None:
-    """Put a strip of pictures of a task's films among the results."""
-    rows = [
-        Row(label_of(film.decoder), outcome, success, moments(_pictures(film.film), PICTURES))
-        for film in of_task
-        for outcome, success in [_outcome(film)]
-    ]
-    write_atomically(folder / STRIP.format(of_task[0].trained.task), lambda path: _write_strip(rows, path))
-
-
-def show_films(of_task: Sequence[Film], folder: Path) -> None:
-    """Put a task's films themselves among the results, with an animation of them side by side."""
-    for film in of_task:
-        for path in film.files:
+def show(task: str, of_task: Sequence[Film], folder: Path, with_films: bool) -> None:
+    """Put a strip of pictures of a task's films among the results; with an animation and the films if wanted."""
+    panels = [_panel(film) for film in of_task]
+    rows = [Row(each.title, each.outcome, each.success, _moments(each.film)) for each in panels]
+    write_atomically(folder / STRIP.format(task), lambda path: _write_strip(rows, path))
+    if with_films:
+        for path in chain.from_iterable(film.files for film in of_task):
             shutil.copy2(path, folder)
-    write_animation([Panel(label_of(film.decoder), *_outcome(film), film.film) for film in of_task], folder / ANIMATION)
+        write_animation(panels, folder / ANIMATION)
+
+
+def _panel(film: Film) -> Panel:
+    outcome = Trace.load(film.path).outcome
+    return Panel(label_of(film.decoder), outcome.replace("_", " "), outcome == SUCCESS, film.files[0])
+
+
+def _moments(film: Path) -> list[Picture]:
+    with closing(av.open(str(film))) as container:
+        pictures = [np.array(frame.to_image()) for frame in container.decode(container.streams.video[0])]
+    return moments(pictures, PICTURES)
 
 
 def _write_strip(rows: Sequence[Row], path: Path) -> None:
     write_strip(rows, path)
     Image.open(path).convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
-
-
-def _outcome(film: Film) -> tuple[str, bool]:
-    """Outcome of a filmed rollout for people, and whether it is success."""
-    outcome = Trace.load(film.path).outcome
-    return outcome.replace("_", " "), outcome == SUCCESS
-
-
-def _pictures(film: Path) -> list[Picture]:
-    with closing(av.open(str(film))) as container:
-        return [np.array(frame.to_image()) for frame in container.decode(container.streams.video[0])]

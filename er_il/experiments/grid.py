@@ -2,16 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Self
 
 from pydantic import AliasChoices, Field, StrictInt, StrictStr, model_validator
 
 from er_il.arms.arm import Arm
 from er_il.datasets.recipe import Recipe
-from er_il.envs.tasks import task_id
 from er_il.evaluation.posture_baselines import POSTURE_BASELINES, space_of
-from er_il.support.declaration import Declaration, declared, read_declaration
+from er_il.support.declaration import Declaration
 from er_il.support.errors import ErIlError, UnknownNameError
 from er_il.support.resources import data_dir
 
@@ -43,6 +41,9 @@ class Grid(Declaration):
         UnknownNameError: unknown task, arm, decoder or posture baseline.
     """
 
+    noun = "grid"
+    error = GridError
+
     title: StrictStr
     tasks: Annotated[Names, Field(min_length=1)]
     decoders: Annotated[Names, Field(min_length=1)]
@@ -60,8 +61,6 @@ class Grid(Declaration):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        for task in self.tasks:
-            task_id(task)  # raises if unknown
         Arm.preset(self.arm)  # raises if unknown
         for name in self.posture_baselines:
             if name not in POSTURE_BASELINES:
@@ -75,14 +74,10 @@ class Grid(Declaration):
             if twice := sorted({str(value) for value in values if values.count(value) > 1}):
                 raise GridError(f"{key} names {', '.join(twice)} twice.")
         self._check_images()
-        for task in self.tasks:
-            recipe = self.recipe(task)
-            available = recipe.episodes - recipe.validation
-            if max(self.demonstrations) > available:
-                raise GridError(
-                    f"demonstrations holds {max(self.demonstrations)}, "
-                    f"but the recipe of {task} has {available} to train on."
-                )
+        for task in self.tasks:  # raises if unknown
+            recipe, most = self.recipe(task), max(self.demonstrations)
+            if most > (available := recipe.episodes - recipe.validation):
+                raise GridError(f"demonstrations holds {most}, but the recipe of {task} has {available} to train on.")
         return self
 
     def _check_images(self) -> None:
@@ -98,14 +93,18 @@ class Grid(Declaration):
 
     def recipe(self, task: str) -> Recipe:
         """Recipe of a task's demonstrations."""
-        recipe = Recipe.load(task, self.arm)
-        own = {"cameras": list(self.cameras.get(task, ())), "seed": self.recording_seed}
-        recipe = Recipe.from_dict(recipe.to_dict() | own)
+        cameras = self.cameras.get(task, ())
+        recipe = Recipe.load(task, self.arm).replaced(cameras=cameras, seed=self.recording_seed)
         return recipe if self.episodes is None else recipe.resized(self.episodes)
 
     def seeds_of(self, cell: Cell) -> tuple[int, ...]:
         """Training seeds whose policies a cell rolls out: all, but of a posture baseline only the first."""
         return self.training_seeds[:1] if cell.decoder in POSTURE_BASELINES else self.training_seeds
+
+    @property
+    def spaces(self) -> tuple[str, ...]:
+        """The action spaces of its policies."""
+        return tuple(dict.fromkeys(space_of(name) for name in (*self.decoders, *self.posture_baselines)))
 
     @property
     def cells(self) -> tuple[Cell, ...]:
@@ -117,24 +116,27 @@ class Grid(Declaration):
             for name in (*self.decoders, *self.posture_baselines)
         )
 
-    @classmethod
-    def from_file(cls, path: Path) -> "Grid":
-        """Read a grid from a YAML file.
 
-        Raises:
-            GridError: the file is unreadable or no grid.
-        """
-        return read_declaration(path, "grid", GridError, cls.from_dict)
+def demo_grid(
+    task: str, seed: int, decoders: tuple[str, ...], rollouts: int, demonstrations: int | None, steps: int | None
+) -> Grid:
+    """Return the grid of ``configs/demo.yaml`` with other values, which are those of ``er-il demo``.
 
-    @classmethod
-    def from_dict(cls, values: object) -> "Grid":
-        """Build a grid from plain values, such as :meth:`to_dict` gives.
-
-        Raises:
-            GridError: keys are missing, unknown, or of the wrong type.
-        """
-        return declared(cls, values, "grid", GridError)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON or YAML."""
-        return self.model_dump(mode="json")
+    Raises:
+        GridError: a number is too small.
+        UnknownNameError: unknown task or decoder.
+    """
+    grid, recipe = Grid.from_file(data_dir("configs") / "demo.yaml"), Recipe.load(task)
+    if demonstrations is not None:
+        recipe = recipe.resized(demonstrations)
+    return grid.replaced(
+        title=f"{grid.title}: {task}",
+        tasks=(task,),
+        decoders=decoders,
+        training_seeds=(seed,),
+        recording_seed=seed,
+        rollouts=rollouts,
+        demonstrations=(recipe.episodes - recipe.validation,),
+        episodes=demonstrations,
+        steps=steps,
+    )

@@ -1,6 +1,5 @@
 """The jobs of an experiment: recording demonstrations, training policies, rolling out, filming; each leaves files."""
 
-import json
 import os
 import re
 from dataclasses import asdict, dataclass, field
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.progress import Progress
 
+from er_il.datasets.recipe import Recipe
 from er_il.datasets.record import read_episodes
 from er_il.datasets.recording import generate
 from er_il.envs.contract import dataset_info
@@ -20,8 +20,7 @@ from er_il.evaluation.posture_baselines import POSTURE_BASELINES, POSTURE_DECODE
 from er_il.evaluation.recording import record_rollout
 from er_il.evaluation.results import save_rollouts
 from er_il.evaluation.rollouts import evaluate
-from er_il.experiments.grid import Grid
-from er_il.experiments.schedule import FileResult, Job
+from er_il.experiments.schedule import Job
 from er_il.policy.configuration import default_config
 from er_il.policy.training import PRECISION, Training, train_episodes
 from er_il.report.films import write_film
@@ -37,87 +36,52 @@ _LOGGED_STEP = re.compile(r"step:([\d.]+)(K?)")  # as lerobot-train logs it
 
 
 @dataclass(frozen=True)
-class Demonstrate(FileResult):
-    """Record the demonstrations of a grid's task, once, and encode them in each space."""
+class Demonstrate(Job):
+    """Record the demonstrations of a recipe, once, and encode them in each space: a folder of datasets, one a space."""
 
-    task: str
-    grid: Grid = field(hash=False)
+    recipe: Recipe = field(hash=False)
     spaces: tuple[str, ...]
-    path: Path  # folder of the datasets, one a space
     workers: int  # processes that record
 
     stage = "Record"
-    needs = ()
-
-    @property
-    def name(self) -> str:
-        return f"demonstrate {self.task}"
-
-    @property
-    def size(self) -> int:
-        return self.grid.recipe(self.task).episodes
 
     @property
     def done(self) -> bool:
         return all((self.path / space).exists() for space in self.spaces)
 
     def run(self) -> None:
-        """Record and encode what is missing."""
-        with Progress(disable=True) as progress:
-            generate(self.grid.recipe(self.task), self.spaces, self.path, progress, self.workers)
+        generate(self.recipe, self.spaces, self.path, Progress(disable=True), self.workers)
 
 
 @dataclass(frozen=True)
-class Train(FileResult):
-    """Train the policy of a space with LeRobot's own command."""
+class Train(Job):
+    """Train the policy of a space, ``size`` steps, with LeRobot's own command, or go on where that was interrupted.
 
-    task: str
+    The result is notes (JSON) on the policy's cost and origin; the training is in the folder of that name beside.
+    """
+
+    needs: tuple[Demonstrate]
     space: str
-    dataset: Path
-    path: Path  # of the notes on the policy: its cost and origin; there once it is trained
-    steps: int
     seed: int
     demonstrations: int  # the first ones of the training episodes
-    configuration: str = ""  # kind of the shipped one, such as images_small; from states if empty
-    needs: tuple[Job, ...] = ()
+    configuration: str  # kind of the shipped one, such as images_small; from states if empty
 
     stage = "Train"
 
     @property
-    def name(self) -> str:
-        return f"train {self.task} {self.space} on {self.demonstrations} demonstrations, seed {self.seed}"
-
-    @property
-    def out(self) -> Path:
-        """Folder of the training, beside its notes and its log."""
-        return self.path.with_suffix("")
-
-    @property
     def training(self) -> Training:
         """The training; the dataset must be there."""
-        config = default_config(self.space, self.configuration)
-        return Training(
-            self.task, self.space, self.dataset, self.out, config, self.steps, self.seed, self.demonstrations
-        )
-
-    @property
-    def size(self) -> int:
-        return self.steps
+        (demonstrated,) = self.needs
+        task, dataset = demonstrated.recipe.task, demonstrated.path / self.space
+        out, config = self.path.with_suffix(""), default_config(self.space, self.configuration)
+        return Training(task, self.space, dataset, out, config, self.size, self.seed, self.demonstrations)
 
     @property
     def progress(self) -> int:
-        try:
-            steps = _LOGGED_STEP.findall(self.log.read_text())
-        except OSError:
-            return 0
-        return int(float(steps[-1][0]) * (1000 if steps[-1][1] else 1)) if steps else 0
+        logged = _LOGGED_STEP.findall(self.log.read_text()) if self.log.exists() else []
+        return int(float(logged[-1][0]) * (1000 if logged[-1][1] else 1)) if logged else 0
 
     def run(self) -> None:
-        """Train, or go on where the training was interrupted.
-
-        Raises:
-            ErIlError: lerobot-train failed; its log says why.
-        """
         training = self.training
         self.log.parent.mkdir(parents=True, exist_ok=True)
         with measured() as cost:
@@ -128,46 +92,27 @@ class Train(FileResult):
                     raise ErIlError(f"lerobot-train ended with exit code {code}.")
         write_json(self.path, _notes(cost) | {"mixed_precision": os.environ.get(PRECISION, "no")})
 
-    def read_notes(self) -> dict[str, Any]:
-        """Cost and origin of the trained policy."""
-        return json.loads(self.path.read_text())
-
 
 @dataclass(frozen=True)
-class RollOut(FileResult):
-    """Roll a trained policy out through a decoder, on some of the initial states."""
+class RollOut(Job):
+    """Roll a trained policy out through a decoder, on ``size`` initial states."""
 
-    trained: Train
+    needs: tuple[Train]
     decoder: str  # a decoder, or a posture baseline
-    first_seed: int
-    count: int
-    path: Path  # of the result
+    first_seed: int  # of the initial states
 
     stage = "Roll out"
 
-    @property
-    def name(self) -> str:
-        last = self.first_seed + self.count - 1
-        return f"roll out {self.decoder} from {self.first_seed} to {last} ({self.trained.name})"
-
-    @property
-    def size(self) -> int:
-        return self.count
-
-    @property
-    def needs(self) -> tuple[Job, ...]:
-        return (self.trained,)
-
     def run(self) -> None:
-        """Roll out and write the rollouts, with what they cost."""
-        leader, elbow = _demonstrated(self.trained.dataset, self.trained.demonstrations)
+        training = self.needs[0].training
+        leader, elbow = _demonstrated(training)
         posture = POSTURE_BASELINES.get(self.decoder)
         with measured() as cost:
             rollouts = evaluate(
-                self.trained.training.policy,
-                self.trained.task,
+                training.policy,
+                training.task,
                 POSTURE_DECODER if posture else self.decoder,
-                episodes=self.count,
+                episodes=self.size,
                 seed=self.first_seed,
                 posture=posture(leader).tolist() if posture else (),
                 elbow=elbow,
@@ -176,56 +121,36 @@ class RollOut(FileResult):
 
 
 @dataclass(frozen=True)
-class Film(FileResult):
-    """Record one rollout of a trained policy: as a film (.mp4), a Rerun recording (.rrd) and a trace (.npz)."""
+class Film(Job):
+    """Record one rollout of a trained policy: as a film (.mp4), a Rerun recording (.rrd) and a trace (.npz, last)."""
 
-    trained: Train
+    needs: tuple[Train]
     decoder: str
     seed: int  # of the initial state
-    path: Path  # of the trace, written last
 
     stage = "Film"
 
     @property
-    def name(self) -> str:
-        return f"film {self.trained.task} through {self.decoder} from {self.seed}"
-
-    @property
-    def needs(self) -> tuple[Job, ...]:
-        return (self.trained,)
-
-    @property
-    def film(self) -> Path:
-        """The film."""
-        return self.path.with_suffix(".mp4")
-
-    @property
-    def files(self) -> tuple[Path, ...]:
-        """All that it makes."""
-        return self.film, self.path.with_suffix(".rrd"), self.path
+    def files(self) -> tuple[Path, Path, Path]:
+        """The film, the recording and the trace."""
+        return self.path.with_suffix(".mp4"), self.path.with_suffix(".rrd"), self.path
 
     def run(self) -> None:
-        """Roll out, film and record.
-
-        Raises:
-            RenderError: the machine cannot render.
-        """
         from er_il.viewer import save_rollout
 
-        policy = self.trained.training.policy
-        trace, pictures = record_rollout(policy, self.trained.task, self.decoder, self.seed, FILM_EVERY)
-        write_film(pictures, self.film, round(1 / trace.period / FILM_EVERY))
-        save_rollout(trace, self.path.with_suffix(".rrd"))
-        trace.save(self.path)
+        training, (film, recording, path) = self.needs[0].training, self.files
+        trace, pictures = record_rollout(training.policy, training.task, self.decoder, self.seed, FILM_EVERY)
+        write_film(pictures, film, round(1 / trace.period / FILM_EVERY))
+        save_rollout(trace, recording)
+        trace.save(path)
 
 
 @lru_cache(maxsize=4)  # jobs of one policy follow one another
-def _demonstrated(dataset: Path, count: int) -> tuple[list[NDArray[np.float64]], ElbowReference | None]:
+def _demonstrated(training: Training) -> tuple[list[NDArray[np.float64]], ElbowReference | None]:
     """The leader's paths (T, n + 1) [rad and opening] that a policy was trained on, and where the elbow was."""
-    info = dataset_info(dataset)
+    info, episodes = dataset_info(training.dataset), read_episodes(training.dataset)
     arm = arm_space_from_spec(action_spec(info["features"])).arm
-    episodes = read_episodes(dataset)
-    chosen = [episodes[i] for i in train_episodes(info)[:count]]
+    chosen = [episodes[i] for i in train_episodes(info)[: training.demonstrations]]
     followed = [demo.state[:, : arm.dof].astype(np.float64) for demo in chosen]
     leader = [demo.leader.astype(np.float64) for demo in chosen]
     return leader, ElbowReference.of_demos(arm, 1 / info["fps"], followed)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import chain, product
+from itertools import chain
 from pathlib import Path
 
 import pandas as pd
@@ -55,89 +55,79 @@ class Plan:
 
     def _claim(self) -> None:
         for task, demonstrate in self._demonstrations.items():
-            recipe = self.grid.recipe(task)
-            for dataset in (demonstrate.path / space for space in demonstrate.spaces):
-                if dataset.exists() and (what := recipe.differences(DatasetRecord.read(dataset).recipe)):
+            for dataset in filter(Path.exists, (demonstrate.path / space for space in demonstrate.spaces)):
+                if what := demonstrate.recipe.differences(DatasetRecord.read(dataset).recipe):
                     raise ErIlError(
                         f"{dataset} holds another recipe's demonstrations; asked for is {what}. "
                         f"Choose another --out, or delete what {self.out} holds of {task}."
                     )
-        owner = self.out / OWNER
-        spaces = sorted({space_of(cell.decoder) for cell in self.grid.cells})
-        mine = {name: yaml.safe_load(default_config(name, self.grid.configuration).read_text()) for name in spaces}
-        theirs = {}
-        if owner.exists():
-            found = json.loads(owner.read_text())
-            theirs = found["configurations"]
-            if found["title"] != self.grid.title:
-                raise ErIlError(f"{self.out} belongs to the grid {found['title']!r}; choose another --out.")
-            if changed := [name for name in mine if name in theirs and mine[name] != theirs[name]]:
-                raise ErIlError(
-                    f"{self.out} holds policies trained by other configurations than today's, of "
-                    f"{', '.join(changed)}; choose another --out, or delete it."
-                )
-        write_json(owner, {"title": self.grid.title, "configurations": theirs | mine})
+        owner, grid = self.out / OWNER, self.grid
+        mine = {name: yaml.safe_load(default_config(name, grid.configuration).read_text()) for name in grid.spaces}
+        found = json.loads(owner.read_text()) if owner.exists() else {"title": grid.title, "configurations": {}}
+        if found["title"] != grid.title:
+            raise ErIlError(f"{self.out} belongs to the grid {found['title']!r}; choose another --out.")
+        theirs = found["configurations"]
+        if changed := [name for name in mine if name in theirs and mine[name] != theirs[name]]:
+            raise ErIlError(
+                f"{self.out} holds policies trained by other configurations than today's, of "
+                f"{', '.join(changed)}; choose another --out, or delete it."
+            )
+        write_json(owner, {"title": grid.title, "configurations": theirs | mine})
 
     @cached_property
     def _demonstrations(self) -> dict[str, Demonstrate]:
-        spaces = tuple(dict.fromkeys(space_of(cell.decoder) for cell in self.grid.cells))
-        folder = self.out / "datasets"
-        return {task: Demonstrate(task, self.grid, spaces, folder / task, self.recorders) for task in self.grid.tasks}
+        folder, spaces, jobs = self.out / "datasets", self.grid.spaces, {}
+        for task in self.grid.tasks:
+            recipe, name = self.grid.recipe(task), f"demonstrate {task}"
+            jobs[task] = Demonstrate(folder / task, name, (), recipe.episodes, recipe, spaces, self.recorders)
+        return jobs
 
     def training(self, cell: Cell, seed: int) -> Train:
         """The training of a cell's policy."""
-        space, grid = space_of(cell.decoder), self.grid
-        demonstrate = self._demonstrations[cell.task]
-        steps = default_steps(default_config(space, grid.configuration)) if grid.steps is None else grid.steps
+        task, space, count = cell.task, space_of(cell.decoder), cell.demonstrations
+        configuration = self.grid.configuration
+        steps = self.grid.steps or default_steps(default_config(space, configuration))
+        variant = f"{count}-demonstrations-{steps}-steps-seed-{seed}"
         return Train(
-            task=cell.task,
+            self.out / "policies" / task / space / f"{variant}.json",
+            f"train {task} {space} on {count} demonstrations, seed {seed}",
+            (self._demonstrations[task],),
+            size=steps,
             space=space,
-            dataset=demonstrate.path / space,
-            path=self.out / "policies" / cell.task / space / f"{_variant(cell, steps, seed)}.json",
-            steps=steps,
             seed=seed,
-            demonstrations=cell.demonstrations,
-            configuration=grid.configuration,
-            needs=(demonstrate,),
+            demonstrations=count,
+            configuration=configuration,
         )
 
-    def _rolling_out(self, cell: Cell, seed: int) -> list[RollOut]:
-        trained = self.training(cell, seed)
-        folder = self.out / "rollouts" / cell.task / cell.decoder / _variant(cell, trained.steps, seed)
+    def _rolling_out(self, cell: Cell) -> Iterator[RollOut]:
         end = FIRST_SEED + self.grid.rollouts
-        jobs = []
-        for start in range(FIRST_SEED, end, POLICY_ROWS):
-            count = min(POLICY_ROWS, end - start)
-            jobs.append(RollOut(trained, cell.decoder, start, count, folder / f"{start}-{start + count - 1}.json"))
-        return jobs
+        for trained in (self.training(cell, seed) for seed in self.grid.seeds_of(cell)):
+            folder = self.out / "rollouts" / cell.task / cell.decoder / trained.path.stem
+            for first in range(FIRST_SEED, end, POLICY_ROWS):
+                count = min(POLICY_ROWS, end - first)
+                last = first + count - 1
+                name = f"roll out {cell.decoder} from {first} to {last} ({trained.name})"
+                yield RollOut(folder / f"{first}-{last}.json", name, (trained,), count, cell.decoder, first)
 
     @cached_property
-    def targets(self) -> dict[Cell, dict[int, list[RollOut]]]:
-        """The rollouts of each cell and training seed."""
-        return {
-            cell: {seed: self._rolling_out(cell, seed) for seed in self.grid.seeds_of(cell)} for cell in self.grid.cells
-        }
+    def targets(self) -> dict[Cell, list[RollOut]]:
+        """The rollouts of each cell, training seed by training seed."""
+        return {cell: list(self._rolling_out(cell)) for cell in self.grid.cells}
 
     @property
     def jobs(self) -> list[RollOut]:
         """All rollouts, the first training seed of every cell first: an early look at the whole table."""
-        pairs = product(self.grid.training_seeds, self.grid.cells)
-        return [job for seed, cell in pairs for job in self.targets[cell].get(seed, ())]
+        return sorted(chain(*self.targets.values()), key=lambda job: self.grid.training_seeds.index(job.needs[0].seed))
 
     @property
     def complete(self) -> list[Cell]:
         """The cells whose rollouts are all done."""
-        return [cell for cell, seeds in self.targets.items() if all(job.done for job in chain(*seeds.values()))]
+        return [cell for cell, jobs in self.targets.items() if all(job.done for job in jobs)]
 
     def rollouts(self, *cells: Cell) -> pd.DataFrame:
         """The rollouts of complete cells in long form (:func:`er_il.evaluation.results.long_form`)."""
         return long_form(
-            (vars(cell) | {"training_seed": seed}, load_rollouts(job.path))
+            (vars(cell) | {"training_seed": job.needs[0].seed}, load_rollouts(job.path))
             for cell in cells
-            for seed, jobs in self.targets[cell].items()
-            for job in jobs
+            for job in self.targets[cell]
         )
-
-
-def _variant(cell: Cell, steps: int, seed: int) -> str:
-    return f"{cell.demonstrations}-demonstrations-{steps}-steps-seed-{seed}"

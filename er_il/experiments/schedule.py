@@ -4,11 +4,13 @@ A job's result is a file. What is there is not made again, so an interrupted sch
 """
 
 import traceback
+from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 from er_il.support.errors import ErIlError
 
@@ -16,76 +18,40 @@ POLL = 0.5  # [s] between looks at what runs
 ATTEMPTS = 3  # of a job whose worker died under it
 
 
-class Job(Protocol):
-    """Work with a result on disk. Jobs travel to other processes: small, hashable, and equal if their work is."""
+@dataclass(frozen=True)
+class Job(ABC):
+    """Work whose result is a file or folder. Jobs travel to other processes: small, hashable, compared by value."""
 
-    @property
-    def name(self) -> str:
-        """What it does, for people; no two jobs of a schedule share it."""
-        ...
+    path: Path  # of the result
+    name: str  # what it does, for people; no two jobs of a schedule share it
+    needs: "tuple[Job, ...]"  # jobs whose results it reads
+    size: int  # amount of its work in units of its stage, such as training steps
 
-    @property
-    def stage(self) -> str:
-        """Kind of its work, such as "Train"; the jobs of a stage share a progress bar."""
-        ...
-
-    @property
-    def size(self) -> int:
-        """Amount of its work in units of its stage, such as training steps."""
-        ...
-
-    @property
-    def progress(self) -> int:
-        """How much of it is done so far, while it runs."""
-        ...
-
-    @property
-    def needs(self) -> "tuple[Job, ...]":
-        """Jobs whose results it reads."""
-        ...
+    stage: ClassVar[str]  # kind of work, such as "Train"; the jobs of a stage share a progress bar
+    progress = 0  # how much of it is done so far, while it runs
 
     @property
     def log(self) -> Path:
         """Where it says what went wrong."""
-        ...
-
-    @property
-    def done(self) -> bool:
-        """True if its result is there."""
-        ...
-
-    def run(self) -> None:
-        """Make the result."""
-        ...
-
-
-class FileResult:
-    """Common part of jobs whose result is one file or folder."""
-
-    size = 1
-    progress = 0
-    path: Path  # of the result
-
-    @property
-    def log(self) -> Path:
         return self.path.with_suffix(".log")
 
     @property
     def done(self) -> bool:
+        """True if its result is there."""
         return self.path.exists()
+
+    @abstractmethod
+    def run(self) -> None:
+        """Make the result."""
 
 
 class Executor(Protocol):
-    """Where functions run."""
+    """Runs functions elsewhere, one on each of its workers."""
 
     @property
-    def workers(self) -> int:
-        """How many run at once."""
-        ...
+    def workers(self) -> int: ...
 
-    def submit(self, function: Callable[..., Any], /, *arguments: Any) -> "Future[Any]":
-        """Run a function elsewhere."""
-        ...
+    def submit(self, function: Callable[..., Any], /, *arguments: Any) -> "Future[Any]": ...
 
 
 class Schedule:
@@ -109,6 +75,10 @@ class Schedule:
             for need in job.needs:
                 self._add(need)
         self.jobs[job] = None
+
+    def progress(self, job: Job) -> int:
+        """How much of a job's size is done."""
+        return job.size if job in self.done else job.progress if job in self.running else 0
 
     def run(self, executor: Executor, watch: Callable[[], None] = lambda: None) -> None:
         """Run all jobs; one that fails, fails alone.
@@ -157,10 +127,9 @@ def perform(job: Job) -> str:
         What went wrong in one line, which the job's log explains; "" if nothing did. As a value, for not every
         exception survives the way back from another process.
     """
-    if job.done:
-        return ""
     try:
-        job.run()
+        if not job.done:
+            job.run()
     except Exception as error:
         job.log.parent.mkdir(parents=True, exist_ok=True)
         with job.log.open("a") as file:

@@ -1,9 +1,8 @@
-"""Plain values from a YAML file, checked against the dataclass that they declare."""
+"""Plain values from a YAML file, checked against the class that declares them."""
 
-import dataclasses
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, Self
 
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -16,25 +15,72 @@ class Declaration(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
+    noun: ClassVar[str]  # for people, such as "recipe"
+    error: ClassVar[type[ErIlError]]  # of values that are no such declaration
 
-def declared[T: Declaration](kind: type[T], values: object, what: str, error: type[ErIlError]) -> T:
-    """Build a declaration from plain values.
+    @classmethod
+    def from_file(cls, path: Path) -> Self:
+        """Read the declaration from a YAML (or JSON) file.
+
+        Raises:
+            ErIlError: of the class's kind: the file is unreadable, or declares something else.
+        """
+        return read_declaration(path, cls.noun, cls.error, cls.from_dict)
+
+    @classmethod
+    def from_dict(cls, values: object, noun: str = "") -> Self:
+        """Build the declaration from plain values, such as :meth:`to_dict` gives.
+
+        Args:
+            values: What a file said.
+            noun: A more precise one than the class's, for messages.
+
+        Raises:
+            ErIlError: of the class's kind: keys are missing, unknown, or of the wrong type; names all that is wrong.
+        """
+        noun = noun or cls.noun
+        if not isinstance(values, Mapping):
+            raise cls.error(f"A {noun} is a mapping of keys to values.")
+        try:
+            return cls.model_validate(dict(values))
+        except ValidationError as cause:
+            raise cls.error(_message(cause, noun, cls.model_fields)) from cause
+
+    def replaced(self, **changes: Any) -> Self:
+        """Return the declaration with other values for some keys.
+
+        Raises:
+            ErIlError: of the class's kind: a key is unknown, or a value is none that it can have.
+        """
+        return self.from_dict(dict(self) | changes)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON or YAML."""
+        return self.model_dump(mode="json")
+
+
+def read_declaration[T](path: Path, noun: str, error: type[ErIlError], build: Callable[[object], T]) -> T:
+    """Read what a YAML (or JSON) file declares.
 
     Args:
-        kind: The declaration.
-        values: What a file said.
-        what: What it should be, such as "recipe".
-        error: What to raise if the values are something else; the message names all that is wrong.
+        path: The file.
+        noun: What it should be, such as "recipe".
+        error: What to raise if it is missing, unreadable, or refused by ``build``.
+        build: Makes the declared object of plain values.
     """
-    if not isinstance(values, Mapping):
-        raise error(f"A {what} is a mapping of keys to values.")
     try:
-        return kind.model_validate(dict(values))
-    except ValidationError as cause:
-        raise error(_message(cause, kind, what)) from cause
+        values = yaml.safe_load(path.read_text())
+    except FileNotFoundError as cause:
+        raise error(f"There is no {noun} {path}.") from cause
+    except (yaml.YAMLError, UnicodeDecodeError) as cause:
+        raise error(f"{path} is not valid YAML.") from cause
+    try:
+        return build(values)
+    except ErIlError as cause:
+        raise error(f"{path}: {cause}") from cause
 
 
-def _message(cause: ValidationError, kind: type[Declaration], what: str) -> str:
+def _message(cause: ValidationError, noun: str, valid: Mapping[str, Any]) -> str:
     """All that is wrong, in one line."""
     found: dict[str, list[str]] = {"extra_forbidden": [], "missing": []}
     said = []
@@ -46,52 +92,7 @@ def _message(cause: ValidationError, kind: type[Declaration], what: str) -> str:
         text = each["msg"].removeprefix("Value error, ")
         said.append(f"{where} is {each['input']!r}: {text}." if where else f"{text}.")
     if found["missing"]:
-        said.insert(0, f"The {what} lacks {', '.join(found['missing'])}.")
+        said.insert(0, f"The {noun} lacks {', '.join(found['missing'])}.")
     if found["extra_forbidden"]:
-        said.insert(0, f"A {what} has no {', '.join(found['extra_forbidden'])}. Valid: {', '.join(kind.model_fields)}.")
+        said.insert(0, f"A {noun} has no {', '.join(found['extra_forbidden'])}. Valid: {', '.join(valid)}.")
     return " ".join(said)
-
-
-def read_declaration[T](path: Path, what: str, error: type[ErIlError], build: Callable[[object], T]) -> T:
-    """Read what a YAML (or JSON) file declares.
-
-    Args:
-        path: The file.
-        what: What it should be, such as "recipe".
-        error: What to raise if it is missing, unreadable, or refused by ``build``.
-        build: Makes the declared object of plain values.
-    """
-    try:
-        values = yaml.safe_load(path.read_text())
-    except FileNotFoundError as cause:
-        raise error(f"There is no {what} {path}.") from cause
-    except (yaml.YAMLError, UnicodeDecodeError) as cause:
-        raise error(f"{path} is not valid YAML.") from cause
-    try:
-        return build(values)
-    except ErIlError as cause:
-        raise error(f"{path}: {cause}") from cause
-
-
-def keys_of(declared: type[Any], values: object, what: str, error: type[ErIlError]) -> Mapping[str, Any]:
-    """Return values as a mapping that has the keys of a dataclass, none unknown and none missing.
-
-    Args:
-        declared: The dataclass; fields without a default are required.
-        values: What a file said.
-        what: What it should be, such as "recipe".
-        error: What to raise if it is something else.
-    """
-    if not isinstance(values, Mapping):
-        raise error(f"A {what} is a mapping of keys to values.")
-    fields = {each.name: each for each in dataclasses.fields(declared)}
-    if unknown := [str(key) for key in values if key not in fields]:
-        raise error(f"A {what} has no {', '.join(unknown)}. Valid: {', '.join(fields)}.")
-    required = [name for name, each in fields.items() if _required(each)]
-    if missing := [name for name in required if name not in values]:
-        raise error(f"The {what} lacks {', '.join(missing)}.")
-    return values
-
-
-def _required(each: "dataclasses.Field[Any]") -> bool:
-    return each.default is dataclasses.MISSING and each.default_factory is dataclasses.MISSING

@@ -30,11 +30,10 @@ def cores() -> int:
 
 
 class LocalExecutor(Executor):
-    """Runs functions in fresh processes of this machine; those that died are replaced.
+    """Runs functions in fresh processes of this machine in a ``with`` statement; an exception kills what still runs.
 
-    Use it in a ``with`` statement; an exception kills what still runs. What ran beside the process that died fails
-    too, with :class:`concurrent.futures.BrokenExecutor`, and may be submitted again. loky starts the processes
-    without a fork, which neither OpenGL contexts nor the threads of PyTorch survive.
+    Processes that died are replaced. What ran beside them fails too, with :class:`concurrent.futures.BrokenExecutor`,
+    and may be submitted again. loky starts processes without a fork, which OpenGL and PyTorch do not survive.
 
     Args:
         workers: Number of processes.
