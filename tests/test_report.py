@@ -21,9 +21,9 @@ from er_il.report.grid_page import write_pages
 from er_il.report.joints import joints_figure
 from er_il.report.style import BAD, GOOD, LOOKS, OTHERS, looks_of
 from er_il.report.tables import markdown_table, terminal_table
-from er_il.report.text import table
+from er_il.report.text import sentences, table
 from er_il.report.validity import validity_figure
-from er_il.report.verification import verification_figure, verification_notes
+from er_il.report.verification import verification_figure
 from er_il.spaces.layout import Layout
 from er_il.spaces.registry import make_arm_space
 
@@ -307,7 +307,7 @@ def test_what_is_said_of_a_verification_names_frames_near_singularities_and_sign
         "near_singularity": near,
         "arms": {"panda": {"quaternions_other_side": 0.25}},
     }
-    said = verification_notes(report)
+    said = sentences("verification.txt.j2", **report)
     assert said[0] == "Episode 3: unreachable 2, jump 1"
     assert said[1] == "Episode 0, panda: near a singularity in frames 4 to 9 (smallest singular value 1.0e-02)"
     assert len(said) == 8 and said[6] == "and 2 more in the report"

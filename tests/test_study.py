@@ -15,7 +15,7 @@ from er_il.control.commander import Commander
 from er_il.datasets.joint_paths import JointPath
 from er_il.experiments.studies.prediction import predict, read_training
 from er_il.experiments.studies.validity import SIZES, Condition, measure, study_validity
-from er_il.report.joints import notes, training_notes
+from er_il.report.joints import notes
 from er_il.spaces.joint_choice import choices
 from er_il.spaces.registry import make_arm_space
 from er_il.support.errors import DatasetError
@@ -161,14 +161,14 @@ def test_the_advice_is_checked_against_training():
     (right,) = predict(joint_report(), cells(50, 3, 40))
     assert right["rank_correlation"] == pytest.approx(1.0)
     assert right["top_choice_is_best"] and right["top_choice"] == "j1"
-    (note,) = training_notes({"training": [right]})
+    note = notes(joint_report(training=[right]))[-1]
     assert "the recommended choice, j1, is the best; rank correlation of low risk with success: 1.00. j1 50/50" in note
     (wrong,) = predict(joint_report(), cells(10, 50, 30))
     assert wrong["rank_correlation"] == pytest.approx(-1.0)
     assert not wrong["top_choice_is_best"] and not wrong["top_choice_within_interval_of_best"]
     (alike,) = predict(joint_report(demos={}), cells(50, 50, 50))
     assert alike["rank_correlation"] is None
-    assert "success: undefined, all choices do alike" in training_notes({"training": [alike]})[0]
+    assert "success: undefined, all choices do alike" in notes(joint_report(training=[alike]))[-1]
     assert [row["risk"] for row in alike["choices"]] == [0.2, 0.6, 0.3]  # no demos of that task: the workspace
 
 

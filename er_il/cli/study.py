@@ -65,7 +65,7 @@ def joints(study: OmitArgPrefixes[StudyOptions], *, training: Path | None = None
     """
     from er_il.experiments.studies.joints import study_joints
     from er_il.experiments.studies.prediction import predict, read_training
-    from er_il.report.joints import joints_figure, notes, training_notes
+    from er_il.report.joints import joints_figure, notes
     from er_il.support.workers import cores
 
     cells = read_training(training) if training else []
@@ -74,7 +74,7 @@ def joints(study: OmitArgPrefixes[StudyOptions], *, training: Path | None = None
         report = study_joints(arm, demos, cores(), advance)
         return report | ({"training": predict(report, cells)} if training else {})
 
-    study.run("joints", measure, lambda report: notes(report) + training_notes(report), joints_figure)
+    study.run("joints", measure, notes, joints_figure)
 
 
 def validity(study: OmitArgPrefixes[StudyOptions], *, samples: int = 150) -> None:

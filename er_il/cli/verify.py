@@ -24,7 +24,8 @@ def verify(dataset: Positional[str], *, out: Path | None = None) -> None:
     from er_il.datasets.hub import find_dataset
     from er_il.datasets.verification import verify as verify_dataset
     from er_il.report.tables import terminal_table
-    from er_il.report.verification import verification_figure, verification_notes, verification_texts
+    from er_il.report.text import sentences, table
+    from er_il.report.verification import verification_figure
     from er_il.support.errors import DatasetError
     from er_il.support.provenance import provenance
     from er_il.support.workers import cores
@@ -38,8 +39,8 @@ def verify(dataset: Positional[str], *, out: Path | None = None) -> None:
         )
     report = {"meta": provenance() | {"dataset": dataset}} | verification.report()
     console.print(f"{report['frames']} frames, {report['episodes']} episodes", highlight=False)
-    console.print(terminal_table(verification_texts(report)))
-    for note in verification_notes(report):
+    console.print(terminal_table(table("verification", **report)))
+    for note in sentences("verification.txt.j2", **report):
         console.print(escape(note), highlight=False, soft_wrap=True)
     target = out or Path("outputs/verify") / Path(dataset).name
     write_study(report, target, console, {"round_trip.png": lambda _: verification_figure(verification, dataset)})

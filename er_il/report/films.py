@@ -99,11 +99,10 @@ def _read(film: Path) -> tuple[list[Image.Image], float]:
     """A film's pictures, made smaller, and its rate [Hz]."""
     with closing(av.open(str(film))) as container:
         stream = container.streams.video[0]
-        rate = stream.average_rate
         size = WIDTH, round(WIDTH * stream.height / stream.width)
         pictures = [frame.to_image().resize(size, Image.Resampling.LANCZOS) for frame in container.decode(stream)]
-    assert rate is not None
-    return pictures, float(rate)
+        assert stream.average_rate is not None
+        return pictures, float(stream.average_rate)
 
 
 def _frame(panels: Sequence[Panel], films: Sequence[Sequence[Image.Image]], at: int) -> Image.Image:

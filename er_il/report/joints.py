@@ -32,13 +32,8 @@ def risks(report: Report) -> dict[str, float]:
 
 
 def notes(report: Report) -> list[str]:
-    """Sentences that say which joints to command, why, which to avoid, and where singularities are near."""
+    """Sentences that say which joints to command and avoid, and why; and, if there, how trained policies compare."""
     return sentences("joint_notes.txt.j2", report=report, sets=measures(report), risks=risks(report))
-
-
-def training_notes(report: Report) -> list[str]:
-    """Sentences that compare the advice with trained policies, one per task."""
-    return sentences("joint_training.txt.j2", training=report.get("training", []))
 
 
 def choices_texts(report: Report, choices: Sequence[str]) -> pd.DataFrame:
@@ -49,7 +44,7 @@ def choices_texts(report: Report, choices: Sequence[str]) -> pd.DataFrame:
 def joints_table(report: Report) -> str:
     """Every choice of joints, the best first; then the notes."""
     risk = risks(report)
-    listed = "\n".join(f"- {note}" for note in [*notes(report), *training_notes(report)])
+    listed = "\n".join(f"- {note}" for note in notes(report))
     return f"{markdown_table(choices_texts(report, sorted(risk, key=risk.__getitem__)))}\n\n{listed}"
 
 
@@ -83,20 +78,18 @@ def joints_figure(report: Report) -> Figure:
     panels = {title: panel for title, panel in panels.items() if len(panel)}
     columns = -(-len(panels) // 2)
     figure = Figure(figsize=(4.6 * columns, 6.4))
-    axes = figure.subplots(2, columns, squeeze=False).ravel()
     names = pd.concat(panels.values())["series"].unique()
     looks = {name: Look(name, colour) for name, colour in zip(names, itertools.cycle(COLOURS), strict=False)}
-    for axis, (title, panel) in zip(axes, panels.items(), strict=False):
+    for place, (title, panel) in enumerate(panels.items(), start=1):
+        axis = figure.add_subplot(2, columns, place)
         bar_chart(axis, panel, {name: look for name, look in looks.items() if name in set(panel["series"])})
         axis.set(title=title, xlabel="Commanded joint")
         if title.startswith(("Risk", "Success")):
             percent_axis(axis)
         if crowded:
             axis.tick_params("x", rotation=90, labelsize=6)
-    for empty in axes[len(panels) :]:
-        empty.set_axis_off()
-    axes[1].set_yscale("log")
-    axes[1].axhline(settings["singular"], color=INK, linestyle="--", linewidth=0.9)
+    figure.axes[1].set_yscale("log")
+    figure.axes[1].axhline(settings["singular"], color=INK, linestyle="--", linewidth=0.9)
     legend(figure, below=True)
     best = joined(report["recommended"])
     figure.suptitle(f"Which joint should ERJ command on {report['arm']}? Recommended: {best}", x=0.01, ha="left")

@@ -22,15 +22,15 @@ def read_rows(text: str) -> pd.DataFrame:
 
 def markdown_table(texts: pd.DataFrame) -> str:
     """Texts by heading as a Markdown table."""
-    lines = [list(texts), ["---"] * len(texts.columns), *texts.to_numpy().tolist()]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    heading, *rows = _lines(texts)
+    return "\n".join(f"| {' | '.join(line)} |" for line in (heading, ["---"] * len(heading), *rows))
 
 
 def terminal_table(texts: pd.DataFrame) -> Table:
     """Texts by heading as a table for the terminal, without Markdown's marks."""
-    plain = texts.rename(columns=_plain).map(_plain)
-    shown = Table(*plain, box=None, header_style="bold")
-    for row in plain.itertuples(index=False):
+    heading, *rows = ([escape(re.sub(r"\*\*|`", "", text)) for text in row] for row in _lines(texts))
+    shown = Table(*heading, box=None, header_style="bold")
+    for row in rows:
         shown.add_row(*row)
     return shown
 
@@ -40,5 +40,5 @@ def joined(names: Sequence[str]) -> str:
     return " + ".join(names)
 
 
-def _plain(text: str) -> str:
-    return escape(text.replace("**", "").replace("`", ""))
+def _lines(texts: pd.DataFrame) -> list[list[str]]:
+    return [list(texts), *texts.to_numpy().tolist()]

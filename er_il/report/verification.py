@@ -3,28 +3,15 @@
 import itertools
 
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from er_il.datasets.verification import Array, Flags, Verification
 from er_il.report.style import BLUE, GREEN, GREY, GRID, ORANGE, styled
-from er_il.report.text import Report, sentences, table
 from er_il.spaces.round_trip import EXACT, SINGULAR
 
 FLOOR = 1e-9  # [rad] errors below are drawn here: a logarithmic axis needs one
-WIDTH, HEIGHT = 10.0, 3.0  # [in] of a row
 SEPARATED = 60  # episodes at most between which lines are drawn
-
-
-def verification_texts(report: Report) -> pd.DataFrame:
-    """Texts of the summary, a row per measurement and a column per arm."""
-    return table("verification", report=report)
-
-
-def verification_notes(report: Report) -> list[str]:
-    """Sentences on invalid frames, singularities and quaternion signs."""
-    return sentences("verification.txt.j2", report=report)
 
 
 @styled
@@ -33,7 +20,7 @@ def verification_figure(verification: Verification, title: str) -> Figure:
     name, label = ("error", "Joint error [rad]") if verification.compared else ("position_error", "Position error [m]")
     flagged, errors, smallest = map(verification.gathered, ("flagged", name, "conditioning"))
     starts = np.cumsum([0, *(len(each.status) for each in verification.episodes)]).tolist()
-    figure = Figure(figsize=(WIDTH, HEIGHT * len(verification.arms)))
+    figure = Figure(figsize=(10.0, 3.0 * len(verification.arms)))
     axes = figure.subplots(len(verification.arms), 2, squeeze=False)
     for arm, (arm_label, (left, right)) in enumerate(zip(verification.arms, axes, strict=True)):
         for axis in (left, right):
