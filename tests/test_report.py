@@ -16,7 +16,7 @@ from PIL import Image
 from er_il import Arm
 from er_il.datasets.verification import CheckedEpisode, Verification
 from er_il.report.charts import demonstrations_figure, success_figure
-from er_il.report.films import PAUSE, WIDTH, Panel, Row, moments, strip_figure, write_animation, write_film, write_strip
+from er_il.report.films import PAUSE, WIDTH, Panel, moments, strip_figure, write_animation, write_film, write_strip
 from er_il.report.grid_page import write_pages
 from er_il.report.joints import joints_figure
 from er_il.report.style import BAD, GOOD, LOOKS, OTHERS, looks_of
@@ -253,18 +253,21 @@ def test_moments_go_from_the_first_to_the_last() -> None:
     assert len(moments(pictures(1), 3)) == 3
 
 
-def test_a_strip_shows_every_row(tmp_path: Path) -> None:
-    rows = [Row("erj", "success", True, pictures(4)), Row("task", "collision", False, pictures(4))]
-    figure = strip_figure(rows)
-    shown = [axis.images[0].get_array() for axis in figure.axes]
-    assert [int(np.mean(picture)) for picture in shown if picture is not None] == 2 * [0, 10, 20, 30]
-    for row, line in zip(rows, (figure.axes[:4], figure.axes[4:]), strict=True):
-        assert line[0].get_title(loc="left") == row.title
-        assert line[-1].get_title(loc="right") == row.outcome
+def test_a_strip_shows_every_film_from_its_first_to_its_last_picture(tmp_path: Path) -> None:
+    long, short = tmp_path / "long.mp4", tmp_path / "short.mp4"
+    write_film(pictures(10), long, rate=10)
+    write_film(pictures(4), short, rate=10)
+    panels = [Panel("erj", "success", True, long), Panel("task", "collision", False, short)]
+    figure = strip_figure(panels, 4)
+    shown = [np.mean(picture) for axis in figure.axes if (picture := axis.images[0].get_array()) is not None]
+    assert shown == pytest.approx([0, 30, 60, 90, 0, 10, 20, 30], abs=4)
+    for panel, line in zip(panels, (figure.axes[:4], figure.axes[4:]), strict=True):
+        assert line[0].get_title(loc="left") == panel.title
+        assert line[-1].get_title(loc="right") == panel.outcome
     outcomes = [axis._right_title for axis in (figure.axes[3], figure.axes[7])]  # pyright: ignore[reportAttributeAccessIssue]
     assert [title.get_color() for title in outcomes] == [GOOD, BAD]
-    write_strip(rows, tmp_path / "strip.png")
-    write_strip(rows[:1], tmp_path / "one.png")
+    write_strip(panels, 4, tmp_path / "strip.png")
+    write_strip(panels[:1], 4, tmp_path / "one.png")
     strip, single = imread(tmp_path / "strip.png"), imread(tmp_path / "one.png")
     assert strip.shape[1] == single.shape[1]
     assert strip.shape[0] == pytest.approx(2 * single.shape[0], abs=2)

@@ -2,26 +2,20 @@
 
 import shutil
 from collections.abc import Sequence
-from contextlib import closing
 from itertools import chain
 from pathlib import Path
 
-import av
-import numpy as np
 import pandas as pd
-from PIL import Image
 
-from er_il.evaluation.recording import SUCCESS, Picture
+from er_il.evaluation.recording import SUCCESS
 from er_il.evaluation.trace import Trace
 from er_il.experiments.grid import Cell
 from er_il.experiments.jobs import Film
 from er_il.experiments.plan import Plan
-from er_il.report.films import Panel, Row, moments, write_animation, write_strip
+from er_il.report.films import Panel, write_animation, write_strip
 from er_il.report.style import label_of
-from er_il.support.atomic_files import write_atomically
 
 PICTURES = 5  # of a rollout in a strip
-COLOURS = 256  # of a palette: a strip of its own colours takes three times the space
 STRIP, ANIMATION = "strip_{}.png", "rollouts.webp"  # of a task, among the results
 COLLISION = "collision"  # how the failures begin that a film shows best
 
@@ -55,8 +49,7 @@ def telling_seed(rollouts: pd.DataFrame) -> int:
 def show(task: str, of_task: Sequence[Film], folder: Path, with_films: bool) -> None:
     """Put a strip of pictures of a task's films among the results; with an animation and the films if wanted."""
     panels = [_panel(film) for film in of_task]
-    rows = [Row(each.title, each.outcome, each.success, _moments(each.film)) for each in panels]
-    write_atomically(folder / STRIP.format(task), lambda path: _write_strip(rows, path))
+    write_strip(panels, PICTURES, folder / STRIP.format(task))
     if with_films:
         for path in chain.from_iterable(film.files for film in of_task):
             shutil.copy2(path, folder)
@@ -66,14 +59,3 @@ def show(task: str, of_task: Sequence[Film], folder: Path, with_films: bool) -> 
 def _panel(film: Film) -> Panel:
     outcome = Trace.load(film.path).outcome
     return Panel(label_of(film.decoder), outcome.replace("_", " "), outcome == SUCCESS, film.files[0])
-
-
-def _moments(film: Path) -> list[Picture]:
-    with closing(av.open(str(film))) as container:
-        pictures = [np.array(frame.to_image()) for frame in container.decode(container.streams.video[0])]
-    return moments(pictures, PICTURES)
-
-
-def _write_strip(rows: Sequence[Row], path: Path) -> None:
-    write_strip(rows, path)
-    Image.open(path).convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)

@@ -16,6 +16,7 @@ from er_il.report.style import BAD, GOOD, INK, save
 from er_il.support.atomic_files import write_atomically
 
 PICTURE_WIDTH = 2.6  # [in] in a strip
+COLOURS = 256  # of a strip's palette
 WIDTH = 440  # [px] of a film in an animation
 HEADER, GAP = 30, 6  # [px] above a film for its title, and between films
 TITLE_SIZE = 17  # [px]
@@ -24,18 +25,8 @@ QUALITY = 72  # of WebP's 100
 
 
 @dataclass(frozen=True)
-class Row:
-    """One rollout in a strip: its title, its outcome, and its pictures in time order."""
-
-    title: str
-    outcome: str
-    success: bool
-    pictures: Sequence[Picture]
-
-
-@dataclass(frozen=True)
 class Panel:
-    """One film in an animation: its title, and its outcome, which is shown at the end."""
+    """One film in a strip or an animation: its title, its outcome, and where it lies."""
 
     title: str
     outcome: str
@@ -58,36 +49,41 @@ def write_film(pictures: Sequence[Picture], path: Path, rate: int) -> None:
     write_atomically(path, encode)
 
 
-def moments(pictures: Sequence[Picture], count: int) -> list[Picture]:
+def moments[P](pictures: Sequence[P], count: int) -> list[P]:
     """Pick pictures evenly from the first to the last."""
     return [pictures[i] for i in np.linspace(0, len(pictures) - 1, count).round().astype(int)]
 
 
-def strip_figure(rows: Sequence[Row]) -> Figure:
-    """One rollout a row; all rows have equally many pictures."""
-    height, width = rows[0].pictures[0].shape[:2]
-    columns = len(rows[0].pictures)
-    size = PICTURE_WIDTH * columns, (PICTURE_WIDTH * height / width + 0.42) * len(rows)
+def strip_figure(panels: Sequence[Panel], count: int) -> Figure:
+    """One film a row, each by ``count`` pictures."""
+    rows = [moments(_read(panel.film)[0], count) for panel in panels]
+    width, height = rows[0][0].size
+    size = PICTURE_WIDTH * count, (PICTURE_WIDTH * height / width + 0.42) * len(rows)
     figure = Figure(figsize=size, dpi=110)
-    for row, axes in zip(rows, figure.subplots(len(rows), columns, squeeze=False), strict=True):
-        for picture, axis in zip(row.pictures, axes, strict=True):
+    for panel, row, axes in zip(panels, rows, figure.subplots(len(rows), count, squeeze=False), strict=True):
+        for picture, axis in zip(row, axes, strict=True):
             axis.imshow(picture)
             axis.set_axis_off()
-        axes[0].set_title(row.title, loc="left", fontsize=11, color=INK, fontweight="bold")
-        axes[-1].set_title(row.outcome, loc="right", fontsize=11, color=GOOD if row.success else BAD)
+        axes[0].set_title(panel.title, loc="left", fontsize=11, color=INK, fontweight="bold")
+        axes[-1].set_title(panel.outcome, loc="right", fontsize=11, color=GOOD if panel.success else BAD)
     top = 1 - 0.3 / figure.get_figheight()
     figure.subplots_adjust(left=0.005, right=0.995, bottom=0.01, top=top, wspace=0.02, hspace=0.18)
     return figure
 
 
-def write_strip(rows: Sequence[Row], path: Path) -> None:
-    """Write a strip as a PNG."""
-    save(strip_figure(rows), path)
+def write_strip(panels: Sequence[Panel], count: int, path: Path) -> None:
+    """Write a strip as a PNG with a palette, a third of the space of one without."""
+
+    def write(partial: Path) -> None:
+        save(strip_figure(panels, count), partial)
+        Image.open(partial).convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE).save(partial, optimize=True)
+
+    write_atomically(path, write)
 
 
 def write_animation(panels: Sequence[Panel], path: Path) -> None:
     """Write films side by side as an animated WebP, in their own time; the shorter ones wait at their end."""
-    films, rates = zip(*(_read(panel.film) for panel in panels), strict=True)
+    films, rates = zip(*(_read(panel.film, WIDTH) for panel in panels), strict=True)
     length = max(len(film) for film in films)
     frames = [_frame(panels, films, at) for at in range(length)]
     durations = [round(1000 / rates[0])] * (length - 1) + [PAUSE]
@@ -95,13 +91,15 @@ def write_animation(panels: Sequence[Panel], path: Path) -> None:
     write_atomically(path, lambda partial: frames[0].save(partial, format="WEBP", **options))
 
 
-def _read(film: Path) -> tuple[list[Image.Image], float]:
-    """A film's pictures, made smaller, and its rate [Hz]."""
+def _read(film: Path, width: int | None = None) -> tuple[list[Image.Image], float]:
+    """A film's pictures, resized to ``width`` [px] if given, and its rate [Hz]."""
     with closing(av.open(str(film))) as container:
         stream = container.streams.video[0]
-        size = WIDTH, round(WIDTH * stream.height / stream.width)
-        pictures = [frame.to_image().resize(size, Image.Resampling.LANCZOS) for frame in container.decode(stream)]
         assert stream.average_rate is not None
+        pictures = [frame.to_image() for frame in container.decode(stream)]
+        if width:
+            size = width, round(width * stream.height / stream.width)
+            pictures = [picture.resize(size, Image.Resampling.LANCZOS) for picture in pictures]
         return pictures, float(stream.average_rate)
 
 
