@@ -32,7 +32,7 @@ def quiet_logging() -> Generator[None]:
 @pytest.fixture
 def one_worker(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let commands start as few processes as they can: each imports for seconds."""
-    monkeypatch.setattr("er_il.support.workers.cores", lambda: 1)
+    monkeypatch.setattr("er_il.support.workers.cpu_count", lambda: 1)
 
 
 @pytest.fixture(scope="session")

@@ -19,7 +19,7 @@ MOTORS = [f"motor_{i}" for i in range(1, 8)]
 
 
 @pytest.fixture
-def advise(monkeypatch, capsys, tmp_path):
+def advise(one_worker, monkeypatch, capsys, tmp_path):
     monkeypatch.chdir(tmp_path)
 
     def advised(*arguments: object) -> str:

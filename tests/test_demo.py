@@ -11,7 +11,8 @@ from er_il.cli import main
 from er_il.experiments.grid import GridError, demo_grid
 from er_il.support.errors import UnknownNameError
 
-SMALL = {"decoders": "erj,task-nearest", "demonstrations": "2", "steps": "2", "rollouts": "2"}
+DECODERS = ("task-nearest", "task-posture")
+SMALL = {"decoders": ",".join(DECODERS), "demonstrations": "2", "steps": "2", "rollouts": "2"}
 
 
 def run(monkeypatch: pytest.MonkeyPatch, out: Path, **changes: str) -> None:
@@ -21,21 +22,22 @@ def run(monkeypatch: pytest.MonkeyPatch, out: Path, **changes: str) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("one_worker")
 def test_the_demo_makes_its_report_and_does_nothing_twice(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "demo"
     run(monkeypatch, out)
     report = json.loads((out / "results.json").read_text())
-    assert [(cell["decoder"], cell["episodes"]) for cell in report["cells"]] == [("erj", 2), ("task-nearest", 2)]
-    assert report["meta"]["training_steps"] == {"erj": 2, "task": 2}
+    assert [(cell["decoder"], cell["episodes"]) for cell in report["cells"]] == [(name, 2) for name in DECODERS]
+    assert report["meta"]["training_steps"] == {"task": 2}  # one policy through both decoders
     grid = report["meta"]["grid"]
     assert (grid["episodes"], grid["demonstrations"]) == (2, [1])
     page = (out / "README.md").read_text()
     for cell in report["cells"]:
         assert f"**{cell['successes']}/{cell['episodes']}**" in page
     made = ["table.png", "strip_reach_cup.png", "rollouts.webp", "episodes.csv.gz"]
-    made += [f"{name}{suffix}" for name in ("erj", "task-nearest") for suffix in (".mp4", ".rrd", ".npz")]
+    made += [f"{name}{suffix}" for name in DECODERS for suffix in (".mp4", ".rrd", ".npz")]
     for name in made:
         assert (out / name).stat().st_size > 100, name
     work = [*out.rglob("*.mp4"), *out.rglob("*.safetensors"), *out.rglob("*.parquet"), *out.rglob("1000-1001.json")]

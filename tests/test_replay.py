@@ -22,7 +22,7 @@ RECIPE = Recipe.load("reach_cup").replaced(disturbance=0.0).resized(2)
 @pytest.fixture(scope="module")
 def datasets(tmp_path_factory):
     out = tmp_path_factory.mktemp("data") / "reach_cup"
-    return generate(RECIPE, ["joint", "task", "erj"], out, Progress(disable=True), workers=2).paths
+    return generate(RECIPE, ["joint", "task", "erj"], out, Progress(disable=True), workers=1).paths
 
 
 @pytest.mark.slow

@@ -186,6 +186,7 @@ def test_training_reports_are_read_and_others_refused(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("one_worker")
 def test_the_studies_run_on_recorded_demonstrations(tmp_path, monkeypatch, capsys):
     training = tmp_path / "training.json"
     rows = [
