@@ -1,1 +1,1 @@
-"""Trained policies: the contract with a rollout, training, rolling out and counting."""
+"""Policies: training with LeRobot's command, and acting with what was trained."""
