@@ -1,6 +1,7 @@
 """The command line as a whole: what it loads before it answers, and how it is left."""
 
 import json
+import os
 import subprocess
 import sys
 
@@ -58,3 +59,13 @@ def test_an_interruption_while_a_command_is_loaded_is_one_line(
         main()
     assert left.value.code == INTERRUPTED
     assert capsys.readouterr().err == "Interrupted. The same command resumes.\n"
+
+
+def test_a_reader_that_has_seen_enough_ends_a_command_quietly() -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    asked = subprocess.run(
+        [sys.executable, "-m", "er_il", "--help"], stdout=writer, stderr=subprocess.PIPE, text=True, check=False
+    )
+    os.close(writer)
+    assert (asked.returncode, asked.stderr) == (1, "")

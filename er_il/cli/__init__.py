@@ -44,6 +44,9 @@ def main() -> None:
         _leave(f"error: {error}", USER_MISTAKE)
     except (PermissionError, FileExistsError, IsADirectoryError, NotADirectoryError) as error:
         _leave(f"error: {error.strerror}: {error.filename}", USER_MISTAKE)
+    except BrokenPipeError:  # the reader has seen enough, as in: er-il advise panda | head
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
     except OSError as error:
         if error.errno is None:
             raise
