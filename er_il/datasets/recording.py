@@ -26,7 +26,6 @@ from er_il.datasets.recipe import Recipe
 from er_il.datasets.record import DatasetRecord
 from er_il.datasets.schema import DEMO_SEED, ENVIRONMENT_STATE, IMAGES, LEADER_JOINTS, STATE, features
 from er_il.envs.protocol import arm_env
-from er_il.spaces.base import ArmSpace
 from er_il.spaces.layout import Layout
 from er_il.spaces.registry import check_space, make_arm_space
 from er_il.spaces.spec import ACTION
@@ -66,10 +65,10 @@ def generate(recipe: Recipe, spaces: Sequence[str], out: Path, progress: Progres
         DatasetError: another recipe's data is there, most demos fail, or the folder cannot be written.
         ErIlError: another process writes there.
     """
-    asked = tuple(dict.fromkeys(spaces))
+    asked, layouts = tuple(dict.fromkeys(spaces)), {}
     for space in asked or ("",):
         check_space(space)
-        make_arm_space(space, Arm.preset(recipe.arm))  # raises if the arm has none such
+        layouts[space] = Layout.of_space(make_arm_space(space, Arm.preset(recipe.arm)))  # raises if the arm has none
     with _writing_to(out), SuppressProgressBars(), work_folder(out) as work:
         there = {path.name for path in datasets_in(out)} | {space for space in asked if (out / space).exists()}
         for space in sorted(there):
@@ -77,26 +76,24 @@ def generate(recipe: Recipe, spaces: Sequence[str], out: Path, progress: Progres
         new = tuple(space for space in asked if space not in there)
         first = out / min(there, default=asked[0])
         if not there:
-            _record(recipe, first, work, progress, workers)
+            _record(recipe, layouts[first.name], first, work, progress, workers)
         if missing := [space for space in new if out / space != first]:
             for space in progress.track(missing, description="Encode in the other spaces"):
-                layout = Layout.of_space(make_arm_space(space, Arm.preset(recipe.arm)))
-                encode_dataset(Dataset(first), out / space, layout)
+                encode_dataset(Dataset(first), out / space, layouts[space])
         for leftover in (work / _DEMOS, work / _DATASET):
             shutil.rmtree(leftover, ignore_errors=True)
         (work / _RECIPE).unlink(missing_ok=True)
     return Generated({space: out / space for space in asked}, new, DatasetRecord.read(first).dropped)
 
 
-def _record(recipe: Recipe, target: Path, work: Path, progress: Progress, workers: int) -> None:
+def _record(recipe: Recipe, layout: Layout, target: Path, work: Path, progress: Progress, workers: int) -> None:
     """Collect the demos and write the first dataset from them."""
     world = make_world(recipe)
     try:
         world.reset(seed=0)  # what cannot be rendered shows here, not in a worker
-        space = make_arm_space(target.name, Arm.preset(recipe.arm))
         dropped: dict[int, str] = {}
         demos = _claim(work, recipe)
-        writer = _Writer(recipe, world, space, work / _DATASET)
+        writer = _Writer(recipe, world, layout, work / _DATASET)
         bar = progress.add_task(f"Record {recipe.task}", total=recipe.episodes)
         for seed, reason in collect(recipe, demos, workers):
             if reason:
@@ -115,10 +112,10 @@ def _record(recipe: Recipe, target: Path, work: Path, progress: Progress, worker
 class _Writer:
     """Writes demos as a LeRobot dataset."""
 
-    def __init__(self, recipe: Recipe, world: gymnasium.Env[Any, Any], space: ArmSpace, root: Path) -> None:
+    def __init__(self, recipe: Recipe, world: gymnasium.Env[Any, Any], layout: Layout, root: Path) -> None:
         # Without LeRobot's footers, which it writes at the end, an interrupted dataset is unreadable.
         shutil.rmtree(root, ignore_errors=True)
-        self._recipe, self._space = recipe, space
+        self._recipe, self._layout = recipe, layout
         os.environ.setdefault("SVT_LOG", "1")  # errors only: the encoders would bury the progress bar
         av.logging.set_libav_level(av.logging.ERROR)
         inner = arm_env(world)
@@ -128,20 +125,20 @@ class _Writer:
             root=root,
             fps=world.metadata["render_fps"],
             features=features(
-                space,
+                layout,
                 inner.state_names,
                 inner.environment_state_names,
                 recipe.cameras,
                 recipe.image_size,
             ),
-            robot_type=space.arm.name,
+            robot_type=recipe.arm,
             video_backend="pyav",
             streaming_encoding=True,
             encoder_queue_maxsize=_QUEUE_SIZE,
         )
 
     def add(self, demo: Demo) -> None:
-        actions = Layout.of_space(self._space).encode(demo.joints).astype(np.float32)
+        actions = self._layout.encode(demo.joints).astype(np.float32)
         for step in range(len(demo)):
             frame = {
                 ACTION: actions[step],

@@ -4,7 +4,6 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from er_il.spaces.base import ArmSpace
 from er_il.spaces.layout import Layout
 from er_il.spaces.spec import ACTION, SPEC
 
@@ -20,14 +19,13 @@ Feature = dict[str, Any]
 
 
 def features(
-    space: ArmSpace,
+    layout: Layout,
     state_names: tuple[str, ...],
     environment_state_names: tuple[str, ...],
     cameras: tuple[str, ...],
     image_size: int,
 ) -> dict[str, Feature]:
     """Describe the columns of a dataset of demos, for ``LeRobotDataset.create``."""
-    layout = Layout.of_space(space)
     image = {"dtype": "video", "shape": (image_size, image_size, 3), "names": ["height", "width", "channels"]}
     return {
         ACTION: action_feature(layout),

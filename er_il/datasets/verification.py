@@ -14,17 +14,17 @@ from er_il.datasets.decoding import DecodedEpisode, EncodedEpisode, decode_episo
 from er_il.datasets.sanity_checks import JointSample, check_joint_values
 from er_il.datasets.schema import STATE
 from er_il.kinematics.rotation import Quaternion
-from er_il.kinematics.solver import LIMIT_MARGIN, Status
+from er_il.kinematics.search import at_limits
+from er_il.kinematics.solver import Status
 from er_il.spaces.joint_choice import singular_intervals
 from er_il.spaces.layout import Layout
-from er_il.spaces.pose import PoseSpace
+from er_il.spaces.pose import POSITION_NAMES, PoseSpace
 from er_il.spaces.round_trip import SINGULAR
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 PERCENTILES = (50, 95, 99, 100)
-POSITION_NAMES = ("ee.x", "ee.y", "ee.z")
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +141,8 @@ def _check(layout: Layout, episode: EncodedEpisode, decoded: DecodedEpisode) -> 
     at_limit = np.empty(decoded.status.shape, dtype=bool)
     for p, part in enumerate(layout.parts):
         q, arm = layout.angles(part, decoded.vectors), part.space.arm
-        at_limit[:, p] = np.any((q - arm.lower < LIMIT_MARGIN) | (arm.upper - q < LIMIT_MARGIN), axis=1)
+        at_lower, at_upper = at_limits(arm, q)
+        at_limit[:, p] = np.any(at_lower | at_upper, axis=1)
         if episode.truth is not None:
             error[:, p] = np.abs(q - layout.angles(part, episode.truth)).max(axis=1)
     flagged = (decoded.status != Status.OK) | (decoded.conditioning < SINGULAR) | at_limit

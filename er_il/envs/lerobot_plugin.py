@@ -18,6 +18,7 @@ from er_il.envs.decoders import NEAREST, Decoder
 from er_il.envs.tasks import task_id
 from er_il.envs.wrapper import ActionSpaceEnv, make_action_space_env
 from er_il.spaces.base import ArmSpace
+from er_il.spaces.layout import Layout
 
 
 @EnvConfig.register_subclass("er_il")
@@ -52,7 +53,7 @@ class ErIlEnvConfig(EnvConfig):
         check_answer(self.on_invalid)
         probe = _probe(self.gym_id, self.arm, tuple(self.cameras), self.image_size)
         self.fps = probe.fps
-        action = PolicyFeature(FeatureType.ACTION, (self.space.dim + 1,))  # and the gripper's opening
+        action = PolicyFeature(FeatureType.ACTION, (len(Layout.of_space(self.space).encoded_names),))
         self.features = {ACTION: action} | probe.features
         self.features_map = {ACTION: ACTION} | probe.names
 
@@ -71,7 +72,12 @@ class ErIlEnvConfig(EnvConfig):
 
     def make(self) -> ActionSpaceEnv:
         """Make one environment."""
-        return _make(self.gym_id, self.gym_kwargs, self.decoder, self.rotation, self.on_invalid)
+        return self._maker()
+
+    @property
+    def _maker(self) -> "partial[ActionSpaceEnv]":
+        """Makes one environment; worker processes find :func:`_make`, and with it the tasks."""
+        return partial(_make, self.gym_id, self.gym_kwargs, self.decoder, self.rotation, self.on_invalid)
 
     @property
     def space(self) -> ArmSpace:
@@ -88,10 +94,9 @@ class ErIlEnvConfig(EnvConfig):
         # the last chance to refuse a wrong one is here.
         if policy := parser.get_path_arg("policy"):
             check_policy(policy, self.space)
-        make = partial(_make, self.gym_id, self.gym_kwargs, self.decoder, self.rotation, self.on_invalid)
         # An episode that has ended waits for the batch's slowest; without the freeze its successor's
         # first steps would count into its metrics.
-        factories = [freeze_after_episode_end(make)] * n_envs
+        factories = [freeze_after_episode_end(self._maker)] * n_envs
         vector: VectorEnv
         if use_async_envs and n_envs > 1:
             # OpenGL contexts do not survive a fork.
@@ -102,7 +107,7 @@ class ErIlEnvConfig(EnvConfig):
 
 
 def _make(gym_id: str, gym_kwargs: dict[str, Any], decoder: Decoder, rotation: str, on_invalid: str) -> ActionSpaceEnv:
-    """Make an environment; at module level so that worker processes find it (and the tasks it needs)."""
+    """Make an environment; at module level so that worker processes find it."""
     return make_action_space_env(gym_id, decoder, rotation=rotation, on_invalid=on_invalid, **gym_kwargs)
 
 

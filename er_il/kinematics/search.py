@@ -17,7 +17,7 @@ import numpy as np
 import placo  # pyright: ignore[reportMissingImports]
 from numpy.typing import NDArray
 
-from er_il.arms.arm import POSE_DOF, Vector
+from er_il.arms.arm import POSE_DOF, Arm, Vector
 from er_il.kinematics.forward import ForwardKinematics
 from er_il.kinematics.qp import PoseQp
 from er_il.kinematics.redundancy import Array, Redundancy
@@ -175,7 +175,7 @@ class LocalSearch:
         if attempt.miss.equations is not None:
             matrix, lengths = attempt.miss.equations
             push = push + lengths @ matrix
-        at_lower, at_upper = q - arm.lower < LIMIT_MARGIN, arm.upper - q < LIMIT_MARGIN
+        at_lower, at_upper = at_limits(arm, q)
         return bool(np.any(((at_lower & (push < 0)) | (at_upper & (push > 0))) & self.free(goal)))
 
     def free(self, goal: Goal) -> NDArray[np.bool_]:
@@ -206,3 +206,8 @@ class LocalSearch:
         if key not in self._programs:
             self._programs[key] = PoseQp(self._robot, self.arm, goal.held, posture=posture, equations=goal.equations)
         return self._programs[key]
+
+
+def at_limits(arm: Arm, q: Vector) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Masks (..., n) of the joints that are at their lower, and at their upper limit, at q (..., n) [rad]."""
+    return q - arm.lower < LIMIT_MARGIN, arm.upper - q < LIMIT_MARGIN

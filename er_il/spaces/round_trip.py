@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from er_il.arms.arm import Vector
-from er_il.kinematics.search import LIMIT_MARGIN
+from er_il.kinematics.search import at_limits
 from er_il.kinematics.solver import IkResult, Status
 from er_il.spaces.base import ArmSpace
 
@@ -66,5 +66,4 @@ def round_trip(space: ArmSpace, q: Vector, seed_error: float, rng: np.random.Gen
     seed = np.clip(q + rng.uniform(-seed_error, seed_error, arm.dof), arm.lower, arm.upper)
     action = space.encode(q)
     decoded = space.decode(action, seed)
-    at_limit = np.any((decoded.q - arm.lower < LIMIT_MARGIN) | (arm.upper - decoded.q < LIMIT_MARGIN))
-    return RoundTrip(q, seed, decoded, space.conditioning(q), bool(at_limit))
+    return RoundTrip(q, seed, decoded, space.conditioning(q), bool(np.any(at_limits(arm, decoded.q))))
