@@ -1,9 +1,8 @@
 """Decoding whole episodes of encoded vectors, several episodes at a time."""
 
-import functools
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +11,7 @@ from er_il.datasets.dataset import Dataset
 from er_il.kinematics.solver import Status
 from er_il.spaces.layout import Layout
 from er_il.spaces.spec import ACTION
-from er_il.support.workers import LocalExecutor
+from er_il.support.workers import StatefulWorkers
 
 Array = NDArray[np.float64]
 
@@ -76,9 +75,10 @@ def decode_episodes(
     """Decode episodes, in worker processes if they are long; ``advance`` is told how many frames are done."""
     frames = sum(len(episode.actions) for episode in episodes)
     decoded = []
-    for result in _results(layout, episodes, workers if frames > FEW_FRAMES else 1):
-        decoded.append(result)
-        advance(len(result.vectors))
+    with StatefulWorkers(workers if frames > FEW_FRAMES else 1, partial(Layout.from_spec, layout.spec())) as pool:
+        for result in [pool.submit(decode_episode, episode) for episode in episodes]:
+            decoded.append(result())
+            advance(len(decoded[-1].vectors))
     return decoded
 
 
@@ -104,24 +104,3 @@ def home_vector(layout: Layout) -> Array:
     for part in layout.parts:
         vector[layout.indices(part)] = part.motors.values(part.space.arm.home)
     return vector
-
-
-def _results(layout: Layout, episodes: Sequence[EncodedEpisode], workers: int) -> Iterator[DecodedEpisode]:
-    if workers <= 1:
-        yield from map(functools.partial(decode_episode, layout), episodes)
-    else:
-        with LocalExecutor(workers, _prepare, layout.spec()) as pool:
-            yield from pool.map(_decode, episodes)
-
-
-_layout: Layout | None = None  # of a worker process
-
-
-def _prepare(spec: Mapping[str, Any]) -> None:
-    global _layout
-    _layout = Layout.from_spec(spec)
-
-
-def _decode(episode: EncodedEpisode) -> DecodedEpisode:
-    assert _layout is not None
-    return decode_episode(_layout, episode)

@@ -4,6 +4,7 @@ from collections import Counter, deque
 from collections.abc import Iterator, Mapping
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from er_il.envs.tasks import task_id
 from er_il.support.atomic_files import write_arrays
 from er_il.support.counts import tally
 from er_il.support.errors import DatasetError, PlanError
-from er_il.support.workers import LocalExecutor
+from er_il.support.workers import StatefulWorkers
 
 Floats = NDArray[np.float32]
 
@@ -119,14 +120,14 @@ def collect(recipe: Recipe, folder: Path, workers: int) -> Iterator[tuple[int, s
     """
     seeds, pending = recipe.demo_seeds(), deque()
     kept, dropped = 0, Counter[str]()
-    with LocalExecutor(workers, _prepare, recipe, folder) as pool:
+    with StatefulWorkers(workers, partial(_Recorder, recipe, folder)) as pool:
         while kept < recipe.episodes:
             while len(pending) < recipe.episodes - kept:
                 seed = next(seeds)
-                pending.append((seed, pool.submit(_record, seed)))
-            seed, job = pending.popleft()
+                pending.append((seed, pool.submit(_Recorder.record, seed)))
+            seed, result = pending.popleft()
             try:
-                reason = job.result()
+                reason = result()
             except BrokenProcessPool as error:
                 raise DatasetError("A worker process died, perhaps out of memory. The same command resumes.") from error
             if reason:
@@ -148,7 +149,7 @@ def demo_path(folder: Path, seed: int) -> Path:
 
 @dataclass
 class _Recorder:
-    """State of a worker process between demos."""
+    """State of a worker between demos."""
 
     recipe: Recipe
     folder: Path
@@ -164,19 +165,6 @@ class _Recorder:
             return outcome
         outcome.save(path)
         return ""
-
-
-_recorder: _Recorder | None = None
-
-
-def _prepare(recipe: Recipe, folder: Path) -> None:
-    global _recorder
-    _recorder = _Recorder(recipe, folder)
-
-
-def _record(seed: int) -> str:
-    assert _recorder is not None
-    return _recorder.record(seed)
 
 
 def _stack(observations: list[Any], key: str) -> Floats:

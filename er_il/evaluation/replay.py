@@ -25,7 +25,7 @@ from er_il.kinematics.rotation import Quaternion
 from er_il.spaces.registry import arm_space_from_spec, name_of
 from er_il.support.atomic_files import write_json
 from er_il.support.errors import DatasetError
-from er_il.support.workers import LocalExecutor
+from er_il.support.workers import StatefulWorkers
 
 # [s] The last action is held that long at most: a grip found a little later than in the demo is a grip all the same.
 GRACE = 1.0
@@ -95,13 +95,15 @@ def replay(datasets: Sequence[Path], workers: int, advance: Callable[[Path, str,
     """
     plays = [(dataset, play, read_episodes(dataset)) for dataset in datasets for play in _plays(dataset)]
     cells = []
-    with LocalExecutor(workers, _prepare) as pool:
-        running = [(path, play, [pool.submit(_replay, play, demo) for demo in demos]) for path, play, demos in plays]
-        for path, play, jobs in running:
+    with StatefulWorkers(workers, _Worker) as pool:
+        running = [
+            (path, play, [pool.submit(_Worker.replay, play, demo) for demo in demos]) for path, play, demos in plays
+        ]
+        for path, play, results in running:
             done = []
-            for job in jobs:
-                done.append(job.result())
-                advance(path, play.decoder, len(done), len(jobs))
+            for result in results:
+                done.append(result())
+                advance(path, play.decoder, len(done), len(results))
             dropped = Counter(DatasetRecord.read(path).dropped.values())
             cells.append(ReplayCell(play.recipe.task, play.decoder, tuple(done), dropped))
     return cells
@@ -179,7 +181,7 @@ def _plays(dataset: Path) -> list[_Play]:
 
 @dataclass
 class _Worker:
-    """The world a worker process has open: demos of one play come one after the other."""
+    """The world that a worker has open: demos of one play come one after the other."""
 
     play: _Play | None = None
     world: ActionSpaceEnv | None = None
@@ -188,16 +190,3 @@ class _Worker:
         if self.world is None or play != self.play:
             self.play, self.world = play, play.make()
         return replay_demo(self.world, demo)
-
-
-_worker: _Worker | None = None
-
-
-def _prepare() -> None:
-    global _worker
-    _worker = _Worker()
-
-
-def _replay(play: _Play, demo: RecordedEpisode) -> Replayed:
-    assert _worker is not None
-    return _worker.replay(play, demo)

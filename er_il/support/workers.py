@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future
 from functools import partial
-from typing import Any
+from typing import Any, Concatenate, Self
 
 from loky import ProcessPoolExecutor, cpu_count
 
@@ -37,13 +37,12 @@ class LocalExecutor(Executor):
 
     Args:
         workers: Number of processes.
-        initializer: Prepares each process.
-        arguments: Its arguments.
+        make: Makes the state that a process keeps for :class:`StatefulWorkers`.
     """
 
-    def __init__(self, workers: int, initializer: Callable[..., None] | None = None, *arguments: object) -> None:
+    def __init__(self, workers: int, make: Callable[[], Any] | None = None) -> None:
         self.workers = workers
-        self._prepared = (os.getpid(), initializer, arguments)
+        self._prepared = (os.getpid(), make)
         self._pool = self._new_pool()
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> "Future[Any]":
@@ -58,6 +57,42 @@ class LocalExecutor(Executor):
 
     def _new_pool(self) -> ProcessPoolExecutor:
         return ProcessPoolExecutor(self.workers, initializer=_start, initargs=self._prepared, env=_ENVIRONMENT)
+
+
+class StatefulWorkers[S]:
+    """Workers in a ``with`` statement that each make a state once, such as a world, and run functions of it.
+
+    With one worker no process is started: jobs run in this one when their results are asked for.
+
+    Args:
+        workers: Number of workers.
+        make: Makes the state; a function of a module, or a partial of one.
+    """
+
+    def __init__(self, workers: int, make: Callable[[], S]) -> None:
+        self._make = make
+        self._executor = LocalExecutor(workers, make) if workers > 1 else None
+        self._own: S | None = None
+
+    def submit[**P, T](
+        self, function: Callable[Concatenate[S, P], T], /, *args: P.args, **kwargs: P.kwargs
+    ) -> Callable[[], T]:
+        """Let a worker run a function of its state and more arguments; returns what waits for the result."""
+        if self._executor is not None:
+            return self._executor.submit(_with_state, function, *args, **kwargs).result
+
+        def run() -> T:
+            self._own = self._make() if self._own is None else self._own
+            return function(self._own, *args, **kwargs)
+
+        return run
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exception: Any) -> None:
+        if self._executor is not None:
+            self._executor.__exit__(*exception)
 
 
 def run_jobs[T](
@@ -85,12 +120,20 @@ def end_with_parent() -> None:
         _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
-def _start(parent: int, initializer: Callable[..., None] | None, arguments: tuple[object, ...]) -> None:
+_state: Any = None  # of a worker process
+
+
+def _with_state(function: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
+    return function(_state, *args, **kwargs)
+
+
+def _start(parent: int, make: Callable[[], Any] | None) -> None:
     # loky's workers outlive a parent that is killed: they finish their job, and wait for others for ever.
     threading.Thread(target=_end_without, args=(parent,), daemon=True).start()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
-    if initializer:
-        initializer(*arguments)
+    if make is not None:
+        global _state
+        _state = make()
 
 
 def _end_without(parent: int) -> None:
