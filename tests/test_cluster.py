@@ -17,8 +17,8 @@ from er_il.support.workers import LocalExecutor
 
 
 def many(folder: Path, sleep: float = 0.5) -> list[FileJob]:
-    """Eleven jobs, one of which kills its process."""
-    jobs = [FileJob(folder / f"extra{i}.json", seed=10 + i, sleep=sleep) for i in range(6)]
+    """Eight jobs, one of which kills its process."""
+    jobs = [FileJob(folder / f"extra{i}.json", seed=10 + i, sleep=sleep) for i in range(3)]
     return [*graph(folder, c="die"), *jobs]
 
 

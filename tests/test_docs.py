@@ -29,10 +29,10 @@ SMALLER = {
     "lerobot-train": "--steps=2 --batch_size=2 --num_workers=0 --policy.device=cpu --dataset.video_backend=pyav "
     "--policy.pretrained_backbone_weights=null --policy.dim_model=32 --policy.dim_feedforward=32 --policy.n_heads=2",
     "lerobot-eval": "--eval.n_episodes=1 --eval.batch_size=1 --eval.recording=true",
-    "lerobot-record": "--dataset.num_episodes=2 --dataset.episode_time_s=1 --robot.image_size=32",
-    "lerobot-teleoperate": "--teleop_time_s=0.5 --robot.image_size=32",
+    "lerobot-record": "--dataset.num_episodes=2 --dataset.episode_time_s=0.5 --robot.image_size=32",
+    "lerobot-teleoperate": "--teleop_time_s=0.3 --robot.image_size=32",
     "lerobot-replay": "--robot.image_size=32",
-    "lerobot-rollout": "--duration=0.5 --robot.image_size=32",
+    "lerobot-rollout": "--duration=0.3 --robot.image_size=32",
     "lerobot-dataset-viz": "--save=1 --output-dir=.",
 }
 CI = ".ci/run"
