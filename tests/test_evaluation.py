@@ -140,7 +140,7 @@ def test_a_recorded_rollout_is_the_evaluated_one(policies: dict[str, Path]):
     assert trace.outcome == evaluated.failure
     assert Counter(trace.status) == evaluated.statuses
     assert len(pictures) == math.ceil(len(trace) / 50) + 1
-    assert pictures[0].shape == (720, 960, 3)
+    assert pictures[0].shape == (480, 640, 3)
 
 
 def test_tally_puts_the_most_common_first():

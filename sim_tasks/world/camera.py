@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from er_il.support.errors import ErIlError, RenderError, UnknownNameError
 
 LARGEST_PICTURE = 1024  # [px]
-PICTURE = (720, 960)  # [px] height and width of pictures for people
+PICTURE = (480, 640)  # [px] height and width of pictures for people
 UP = (0.0, 0.0, 1.0)
 
 
