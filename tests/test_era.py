@@ -34,7 +34,7 @@ def test_the_slope_of_the_arm_angle_is_its_derivative():
         at = ANGLE.linearise(q)
         ahead, behind = ANGLE.wrapped(q + h * np.eye(7)), ANGLE.wrapped(q - h * np.eye(7))
         np.testing.assert_allclose(at.derivative[0], at.scale * (ahead - behind) / (2 * h), atol=1e-6)
-        assert at.values[0] == ANGLE.wrapped(q[None])[0]
+        assert np.isclose(at.values[0], ANGLE.wrapped(q[None])[0], rtol=0, atol=1e-12)
 
 
 def test_the_commanded_arm_angle_is_reached_although_the_wrist_moves_with_it():

@@ -132,6 +132,10 @@ class Arm:
         arm._check(links)
         return arm
 
+    def within_limits(self, q: Vector) -> Vector:
+        """Joint angles q (..., n) [rad] clipped to the limits."""
+        return np.minimum(np.maximum(q, self.lower), self.upper)  # numpy.clip takes four times as long for one vector
+
     def _check_redundant(self) -> None:
         if strangers := [joint for joint in self.redundant if joint not in self.joints]:
             raise ArmError(f"Redundant joints {', '.join(strangers)} are not among {', '.join(self.joints)}.")

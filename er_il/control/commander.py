@@ -102,7 +102,7 @@ class Commander:
             raise ShapeError("Joint angles", start.shape, f"({arm.dof},)")
         if not np.all(np.isfinite(start)):
             raise ErIlError("The measured joint angles are not finite; no safe command can start from them.")
-        self._last = np.clip(start, arm.lower, arm.upper)
+        self._last = arm.within_limits(start)
 
     def stop(self) -> None:
         """Let the last command stand until the next reset."""
@@ -172,4 +172,4 @@ class Commander:
         way = target - last
         excess = float(np.max(np.abs(way) / self._reach))
         step = way if excess <= 1.0 else way / excess
-        return np.clip(last + step, self.space.arm.lower, self.space.arm.upper)
+        return self.space.arm.within_limits(last + step)

@@ -12,78 +12,73 @@ on the way in and out, so an arm should not work there.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from er_il.arms.arm import Arm, Vector
-from er_il.kinematics.forward import ForwardKinematics, forward_of
-from er_il.kinematics.redundancy import Array, Linearisation, Redundancy
+from er_il.kinematics.components import Components, at_least, cross, dot, length, minus, plus, select, times
+from er_il.kinematics.redundancy import Array, Redundancy, Slope
 from er_il.support.errors import ArmError, SpecError
 
 VERTICAL = 1e-3  # [rad] closer than this to the vertical, the axis counts as vertical
 MARGIN = 0.2  # cosine of the distance from the turn opposite to the reference, within which turns are in doubt
 TINY = 1e-9  # [m] a circle smaller than this is a point
-UP = np.array([0.0, 0.0, 1.0])
-FORWARD = np.array([1.0, 0.0, 0.0])
 
 
-@dataclass(frozen=True)
-class ElbowCircle:
-    """The circle on which the elbow can turn while shoulder and wrist stay; all in the base frame."""
+class ElbowCircle(NamedTuple):
+    """The circle on which the elbow can turn while shoulder and wrist stay; all in the base frame.
 
-    axis: Array  # (3,) unit vector from shoulder to wrist
-    reach: float  # [m] from shoulder to wrist
-    foot: float  # [m] from the shoulder to the circle's centre, along the axis
-    radius: float  # [m] r_E
-    centre: Array  # (3,) [m] c_E
-    top: Array  # (3,) t_E, unit
-    side: Array  # (3,) b_E, unit
-    vertical: Array  # (3,) what ``top`` is the projection of: up, or forward where the axis is vertical
-    angle: float  # [rad] phi in (-pi, pi]
+    Points and directions are their components (x, y, z): numbers, or arrays (N,) for N circles at once.
+    """
+
+    shoulder: Components  # [m]
+    axis: Components  # unit vector from shoulder to wrist
+    reach: Any  # [m] from shoulder to wrist
+    foot: Any  # [m] from the shoulder to the circle's centre, along the axis
+    radius: Any  # [m] r_E
+    top: Components  # t_E, unit
+    side: Components  # b_E, unit
+    rise: Any  # cosine between the axis and what ``top`` is the projection of: up, or forward where it is vertical
+    angle: Any  # [rad] phi in (-pi, pi]
 
     @classmethod
-    def through(cls, shoulder: Array, elbow: Array, wrist: Array) -> "ElbowCircle":
-        """The circle of three points (3,) [m]."""
-        span = wrist - shoulder
-        reach = max(_length(span), TINY)
-        axis = span / reach
-        vertical = UP if math.hypot(axis[0], axis[1]) > VERTICAL else FORWARD
-        projected = vertical - (vertical @ axis) * axis
-        top = projected / _length(projected)
-        side = _cross(axis, top)
-        arm = elbow - shoulder
-        foot = float(arm @ axis)
-        spoke = arm - foot * axis
-        return cls(
-            axis=axis,
-            reach=reach,
-            foot=foot,
-            radius=max(_length(spoke), TINY),
-            centre=shoulder + foot * axis,
-            top=top,
-            side=side,
-            vertical=vertical,
-            angle=math.atan2(float(spoke @ side), float(spoke @ top)),
-        )
+    def through(cls, shoulder: Components, elbow: Components, wrist: Components, xp: Any = math) -> "ElbowCircle":
+        """The circle of three points [m]; ``xp``: functions for the components' type, ``math`` or an array library."""
+        span = minus(wrist, shoulder)
+        reach = at_least(TINY, length(span, xp), xp)
+        axis = times(1.0 / reach, span)
+        x, y, z = axis
+        upright = x * x + y * y <= VERTICAL**2
+        rise = select(upright, x, z, xp)
+        from_top = select(upright, 1.0, 0.0, xp), 0.0 * rise, select(upright, 0.0, 1.0, xp)
+        projected = minus(from_top, times(rise, axis))
+        top = times(1.0 / length(projected, xp), projected)
+        side = cross(axis, top)
+        arm = minus(elbow, shoulder)
+        foot = dot(arm, axis)
+        spoke = minus(arm, times(foot, axis))
+        radius = at_least(TINY, length(spoke, xp), xp)
+        angle = xp.atan2(dot(spoke, side), dot(spoke, top))
+        return cls(shoulder, axis, reach, foot, radius, top, side, rise, angle)
 
     def elbow(self, angle: float) -> Array:
         """Elbow position (3,) [m] at an arm angle [rad]: the equation above."""
-        return self.centre + self.radius * (self.top * math.cos(angle) + self.side * math.sin(angle))
+        spoke = plus(times(math.cos(angle), self.top), times(math.sin(angle), self.side))
+        centre = plus(self.shoulder, times(self.foot, self.axis))
+        return np.array(plus(centre, times(self.radius, spoke)))
 
-    def slopes(self) -> tuple[Array, Array]:
-        """Derivatives (3,) of r_E phi by the elbow's and by the wrist's position, r_E and the shoulder held.
+    def slopes(self, xp: Any = math) -> tuple[Components, Components]:
+        """Derivatives of r_E phi by the elbow's and by the wrist's position, r_E and the shoulder held.
 
         Lengths along the circle, not angles: these stay finite where the circle shrinks to a point.
         """
-        tangent = self.side * math.cos(self.angle) - self.top * math.sin(self.angle)
+        tangent = minus(times(xp.cos(self.angle), self.side), times(xp.sin(self.angle), self.top))
         # Turning the axis carries the circle's centre along, and turns the highest point about the axis.
-        rise = float(self.vertical @ self.axis)
-        twist = self.radius * rise / math.sqrt(max(1.0 - rise * rise, TINY))
-        return tangent, (twist * self.side - self.foot * tangent) / self.reach
+        twist = self.radius * self.rise / xp.sqrt(at_least(TINY, 1.0 - self.rise * self.rise, xp))
+        return tangent, times(1.0 / self.reach, minus(times(twist, self.side), times(self.foot, tangent)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,39 +109,32 @@ class ArmAngle(Redundancy):
     def names(self) -> tuple[str, ...]:
         return ("arm_angle",)
 
-    @cached_property
-    def _forward(self) -> ForwardKinematics:
-        return forward_of(self.arm)
-
-    @cached_property
-    def _frames(self) -> tuple[str, str, str]:
+    @property
+    def frames(self) -> tuple[str, ...]:
         frames = self.arm.angle_frames
         assert frames is not None
         return frames.shoulder, frames.elbow, frames.wrist
 
     def circle(self, q: Vector) -> ElbowCircle:
         """The elbow's circle at q (n,) [rad]."""
-        return ElbowCircle.through(*self._forward.points(q, self._frames)[0])
+        return ElbowCircle.through(*self._forward.points(q, self.frames).origins)
 
     def wrapped(self, q: Array) -> Vector:
         """Arm angles (N,) [rad] in (-pi, pi] at q (N, n) [rad]."""
-        points = [self._forward.fk_batch(q, frame)[:, :3, 3] for frame in self._frames]
-        return np.array([ElbowCircle.through(*point).angle for point in zip(*points, strict=True)])
+        return ElbowCircle.through(*self._forward.positions(q, self.frames), xp=np).angle
 
     def along(self, q: Array) -> Array:
         unwrapped = np.unwrap(np.concatenate([[self.reference], self.wrapped(q)]))[1:]
         return np.asarray(unwrapped, dtype=np.float64)[:, None]
 
-    def linearise(self, q: Vector) -> Linearisation:
-        points, by_joints = self._forward.points(q, self._frames)
-        circle = ElbowCircle.through(*points)
-        by_elbow, by_wrist = circle.slopes()
-        shoulder, elbow, wrist = by_joints
-        derivative = by_elbow @ (elbow - shoulder) + by_wrist @ (wrist - shoulder)
-        return Linearisation(np.array([circle.angle]), circle.radius, derivative[None])
+    def slope(self, q: Sequence[Any], points: Sequence[Components], xp: Any = math) -> Slope:
+        circle = ElbowCircle.through(*points, xp=xp)
+        by_elbow, by_wrist = circle.slopes(xp)
+        by_shoulder = times(-1.0, plus(by_elbow, by_wrist))
+        return Slope((circle.angle,), circle.radius, ((by_shoulder, by_elbow, by_wrist),))
 
     def difference(self, start: Vector, end: Vector) -> Vector:
-        return np.array([wrapped(turn) for turn in end - start])
+        return wrapped(end - start)
 
     def fitted(self, postures: Array) -> "ArmAngle":
         """Another reference where the arm angles of postures lie about half a turn from this one."""
@@ -171,16 +159,6 @@ class ArmAngle(Redundancy):
         return own
 
 
-def wrapped(angle: float) -> float:
-    """The representative of an angle [rad] in [-pi, pi)."""
+def wrapped[T: (float, Array)](angle: T) -> T:
+    """The representative of an angle [rad] in [-pi, pi), or of each of an array."""
     return (angle + math.pi) % (2.0 * math.pi) - math.pi
-
-
-def _length(v: Vector) -> float:
-    return math.sqrt(v @ v)
-
-
-def _cross(a: Vector, b: Vector) -> Vector:
-    # numpy.cross takes ten times as long for a single pair of vectors, and this runs at every step of IK.
-    (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
-    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])

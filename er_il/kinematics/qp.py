@@ -18,6 +18,7 @@ from er_il.arms.arm import Arm, Vector
 Array = NDArray[np.float64]
 
 MIN_DAMPING = 1e-10  # [1] keeps the program strictly convex
+NO_DAMPING = 1e-12  # [1] so little more changes no step
 MAX_STEP = 0.2  # [rad] longest joint step: the linearisation is not trusted farther
 POSTURE_WEIGHT = 1e-2  # [1] weak against the pose: it acts on the null space
 EQUATION_WEIGHT = 1.0  # [1] a redundancy's equations, scaled to lengths, weigh as much as a position
@@ -38,9 +39,13 @@ class PoseQp:
             posture: True if the null space is pulled towards a posture.
             equations: Number of linear equations on the joints.
         """
-        self._arm = arm
+        self._lower, self._upper = arm.lower, arm.upper
+        self._joints = arm.joints
         self._robot = robot
         self._order = np.array([robot.get_joint_offset(joint) for joint in arm.joints])
+        self._velocities = self._order - 1  # the floating base has one number fewer in a velocity
+        self.free = np.setdiff1d(np.arange(arm.dof), list(held))  # indices of the joints that move
+        self._free = self._velocities[self.free]
         self._state = np.array(robot.state.q)
         self._T_world_base = np.array(robot.get_T_world_frame(arm.base_frame))
         self._program = placo.KinematicsSolver(robot)
@@ -50,11 +55,13 @@ class PoseQp:
             self._program.mask_dof(arm.joints[joint])
         self._pose = self._program.add_frame_task(arm.ee_frame, np.eye(4))
         self._pose.configure("pose", "soft", 1.0, 1.0)
+        self._position, self._orientation = self._pose.position(), self._pose.orientation()
         self._damping = self._program.add_regularization_task(MIN_DAMPING)
+        self._damped = 0.0  # the damping beyond the least that is configured
         self._posture = self._program.add_joints_task() if posture else None
         if self._posture is not None:
             self._posture.configure("posture", "soft", POSTURE_WEIGHT)
-        self._rows = np.zeros((2 * equations, len(robot.state.q)))
+        self._rows = np.zeros((2 * equations, len(self._state)))
         self._equations = None
         if equations:  # each written as two half-spaces
             self._equations = self._program.add_joint_space_half_spaces_constraint(self._rows, np.zeros(2 * equations))
@@ -64,10 +71,27 @@ class PoseQp:
         """Set the target pose (4, 4) and the posture (n,) [rad]."""
         self._pose.T_world_frame = self._T_world_base @ T_base_ee
         if self._posture is not None and posture is not None:
-            self._posture.set_joints(dict(zip(self._arm.joints, posture.tolist(), strict=True)))
+            self._posture.set_joints(dict(zip(self._joints, posture.tolist(), strict=True)))
+
+    def place(self, q: Vector) -> tuple[float, float]:
+        """Put the robot at q (n,) [rad]; returns its distance [m] and angle [rad] from the target pose."""
+        self._state[self._order] = q
+        self._robot.state.q = self._state
+        self._robot.update_kinematics()
+        self._position.update()
+        self._orientation.update()
+        return self._position.error_norm(), self._orientation.error_norm()
+
+    def derivative(self) -> Array:
+        """Derivative (6, free joints) of the pose where the robot was placed, close to the target; in Placo's axes."""
+        return np.concatenate([self._position.A, self._orientation.A]).take(self._free, axis=1)
+
+    def gap(self) -> Vector:
+        """Way (6,) [m and rad] to the target pose from where the robot was placed, in the same axes."""
+        return np.concatenate([self._position.b, self._orientation.b])
 
     def step(self, q: Vector, damping: float, equations: tuple[Array, Vector] | None = None) -> Vector:
-        """Return the angles (n,) [rad] one step from q.
+        """Return the angles (n,) [rad] one step from q, where the robot was placed last.
 
         Args:
             q: (n,) [rad] start of the step.
@@ -77,19 +101,22 @@ class PoseQp:
         Raises:
             RuntimeError: the program has no solution.
         """
-        arm = self._arm
-        self._state[self._order] = q
-        self._robot.state.q = self._state
-        self._robot.update_kinematics()  # the program linearises around the robot's last kinematics
-        self._damping.configure("damping", "soft", MIN_DAMPING + damping)
+        if damping < NO_DAMPING:
+            damping = 0.0
+        if damping != self._damped:
+            self._damping.configure("damping", "soft", MIN_DAMPING + damping)
+            self._damped = damping
         if self._equations is not None and equations is not None:
             matrix, change = equations
-            self._rows[:, self._order] = np.concatenate([matrix, -matrix])
+            m = len(change)
+            self._rows[:m, self._order] = matrix
+            self._rows[m:, self._order] = -matrix
             goal = matrix @ q + change
             self._equations.A, self._equations.b = self._rows, np.concatenate([goal, -goal])
-        # The floating base has one number fewer in a velocity than in a configuration.
-        dq = self._program.solve(False)[self._order - 1]
-        longest = float(np.abs(dq).max())
+        dq = self._program.solve(False)[self._velocities]
+        longest = max(map(abs, dq.tolist()))
         if longest > MAX_STEP:
-            dq = dq * (MAX_STEP / longest)
-        return np.minimum(np.maximum(q + dq, arm.lower), arm.upper)  # the program keeps limits to its own tolerance
+            dq *= MAX_STEP / longest
+        dq += q
+        np.maximum(dq, self._lower, out=dq)  # the program keeps limits to its own tolerance
+        return np.minimum(dq, self._upper, out=dq)

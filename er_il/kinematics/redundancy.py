@@ -4,19 +4,36 @@ An ER action space is a pose and a redundancy. The solver, the spaces, the advis
 a redundancy by this interface alone; a further ER space is one more implementation of it.
 """
 
+import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple, Self
 
+import array_api_compat as array_api
 import numpy as np
 from numpy.typing import NDArray
 
 from er_il.arms.arm import Arm, Vector
+from er_il.kinematics.chain import Walk, constant
+from er_il.kinematics.components import Components
+from er_il.kinematics.forward import ForwardKinematics, forward_of
 from er_il.support.errors import UnknownNameError
 
 Array = NDArray[np.float64]
+
+
+class Slope(NamedTuple):
+    """A redundancy and its scaled derivative, at one configuration (numbers) or at N (arrays (N,) of any library).
+
+    The derivative is taken by the origins of the redundancy's links, or by the joints, or is the sum of both.
+    """
+
+    values: Sequence[Any]  # m values [rad]
+    scale: Any  # see Linearisation
+    by_points: Sequence[Sequence[Components]] = ()  # for each value, one for each link
+    by_joints: Array | None = None  # (m, n) constant
 
 
 class Linearisation(NamedTuple):
@@ -51,9 +68,46 @@ class Redundancy(ABC):
     def along(self, q: Array) -> Array:
         """Values (N, m) [rad] along a trajectory q (N, n) [rad] in time order, continuous in time."""
 
+    @property
+    def frames(self) -> tuple[str, ...]:
+        """Names of the links whose origins the values depend on."""
+        return ()
+
     @abstractmethod
+    def slope(self, q: Sequence[Any], points: Sequence[Components], xp: Any = math) -> Slope:
+        """Values and their derivative.
+
+        Args:
+            q: The n joint angles [rad], numbers or arrays (N,).
+            points: Origins of the links ``frames`` [m] in the base frame, of the same type.
+            xp: Functions for the type: ``math``, or an array library.
+        """
+
     def linearise(self, q: Vector) -> Linearisation:
         """Values and scaled derivative at q (n,) [rad]."""
+        points = self._forward.points(q, self.frames) if self.frames else None
+        at = self.slope(q.tolist(), points.origins if points else ())
+        derivative = at.by_joints
+        if points:
+            by_points = np.array([points.slope(weights) for weights in at.by_points])
+            derivative = by_points if derivative is None else derivative + by_points
+        assert derivative is not None
+        return Linearisation(np.array(at.values), at.scale, derivative)
+
+    def linearise_batch(self, walk: Walk) -> tuple[Any, Any, Any]:
+        """Values (m, N) [rad], scale and scaled derivative (m, n, N) at the configurations of a walk."""
+        xp = array_api.array_namespace(walk.q)
+        links = [self._forward.mounted(frame) for frame in self.frames]
+        at = self.slope(tuple(walk.q.T), [walk.point(link) for link in links], xp)
+        rows = []
+        for i in range(len(at.values)):
+            row = 0.0 if at.by_joints is None else constant(at.by_joints[i, :, None], walk.q)
+            rows.append(row + walk.slope(links, at.by_points[i]) if links else row + 0.0 * walk.q.T)
+        return xp.stack(tuple(at.values), axis=0), at.scale, xp.stack(rows, axis=0)
+
+    @cached_property
+    def _forward(self) -> ForwardKinematics:
+        return forward_of(self.arm)
 
     def difference(self, start: Vector, end: Vector) -> Vector:
         """The shortest change (m,) [rad] that leads from values ``start`` to values ``end``."""
@@ -94,6 +148,10 @@ class JointAngle(Redundancy):
 
     @property
     def names(self) -> tuple[str, ...]:
+        return self._names
+
+    @cached_property
+    def _names(self) -> tuple[str, ...]:
         return tuple(f"{joint}.pos" for joint in self.joints)
 
     @cached_property
@@ -103,6 +161,5 @@ class JointAngle(Redundancy):
     def along(self, q: Array) -> Array:
         return q[:, self.held]
 
-    def linearise(self, q: Vector) -> Linearisation:
-        held = list(self.held)
-        return Linearisation(q[held], 1.0, np.eye(self.arm.dof)[held])
+    def slope(self, q: Sequence[Any], points: Sequence[Components], xp: Any = math) -> Slope:
+        return Slope([q[joint] for joint in self.held], 1.0, by_joints=np.eye(self.arm.dof)[list(self.held)])

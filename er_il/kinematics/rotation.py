@@ -7,14 +7,16 @@ sign nearer to its predecessor. A plain ``w >= 0`` would flip exactly where grip
 that points down or forward is about half a turn from the identity.
 """
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from er_il.kinematics.components import Components, cross
 from er_il.support.errors import UnknownNameError
 
 Array = NDArray[np.float64]
@@ -43,6 +45,17 @@ class RotationCode(ABC):
             RotationError: the code stands for no rotation (zero or degenerate).
         """
 
+    @abstractmethod
+    def decode_batch(self, code: Any, xp: Any) -> tuple[Any, Any]:
+        """Decode many codes at once.
+
+        Args:
+            code: (len(names), N), an array of the library ``xp``.
+
+        Returns:
+            Rotation matrices (3, 3, N), and a mask (N,) of the codes that stand for one.
+        """
+
 
 @dataclass(frozen=True)
 class Quaternion(RotationCode):
@@ -60,9 +73,17 @@ class Quaternion(RotationCode):
         return quaternions * np.cumprod(turns)[:, None]
 
     def decode(self, code: Array) -> Array:
-        if np.linalg.norm(code) < MIN_NORM:
+        x, y, z, w = code.tolist()
+        norm = math.sqrt(x * x + y * y + z * z + w * w)
+        if norm < MIN_NORM:
             raise RotationError("a zero quaternion is no rotation")
-        return Rotation.from_quat(code).as_matrix()
+        return np.array(quaternion_rows(x / norm, y / norm, z / norm, w / norm))
+
+    def decode_batch(self, code: Any, xp: Any) -> tuple[Any, Any]:
+        norm = xp.sqrt(xp.sum(code * code, axis=0))
+        rotates = norm >= MIN_NORM
+        rows = quaternion_rows(*(code / xp.where(rotates, norm, 1.0)))
+        return xp.stack([xp.stack(row, axis=0) for row in rows], axis=0), rotates
 
 
 @dataclass(frozen=True)
@@ -78,8 +99,28 @@ class Rot6d(RotationCode):
     def decode(self, code: Array) -> Array:
         x = _unit(code[:3])
         y = _unit(code[3:] - x * (x @ code[3:]))
-        z = np.asarray(np.cross(x, y), dtype=np.float64)
-        return np.column_stack([x, y, z])
+        return np.column_stack([x, y, cross(x.tolist(), y.tolist())])
+
+    def decode_batch(self, code: Any, xp: Any) -> tuple[Any, Any]:
+        x, straight = _units(code[:3], xp)
+        y, across = _units(code[3:] - x * xp.sum(x * code[3:], axis=0), xp)
+        return xp.stack([x, y, xp.stack(cross(tuple(x), tuple(y)), axis=0)], axis=1), straight & across
+
+
+def _units(v: Any, xp: Any) -> tuple[Any, Any]:
+    """Vectors (3, N) of length one, and a mask (N,) of those that have a direction."""
+    norm = xp.sqrt(xp.sum(v * v, axis=0))
+    directed = norm >= MIN_NORM
+    return v / xp.where(directed, norm, 1.0), directed
+
+
+def quaternion_rows(x: Any, y: Any, z: Any, w: Any) -> tuple[Components, Components, Components]:
+    """Rows of the rotation matrix of a unit quaternion: numbers, or arrays (N,) for N quaternions."""
+    return (
+        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)),
+        (2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)),
+        (2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)),
+    )
 
 
 def _unit(v: Array) -> Array:

@@ -10,12 +10,13 @@ the fold. Near it the seed may lie closer to the one of the pair that the steps 
 """
 
 import math
-from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 import placo  # pyright: ignore[reportMissingImports]
 from numpy.typing import NDArray
+from scipy.linalg import lapack
 
 from er_il.arms.arm import POSE_DOF, Arm, Vector
 from er_il.kinematics.forward import ForwardKinematics
@@ -27,6 +28,10 @@ ROTATION_TOLERANCE = 1e-3  # [rad]
 MAX_ITERATIONS = 50
 DAMPING_GROWTH = 1e-2  # [1] damping per squared miss in m and rad
 CAUTION = 10.0  # damping grows by this factor after a step that overshot, and shrinks after one that did not
+CLOSE = 1e-2  # [m and rad] from here, where no fold is near, Newton's steps end the search:
+NEWTON = 4  # at most so many,
+QUICK = 0.1  # each leaving at most so much of the miss,
+LAST = 1e-5  # [m and rad] and from here the last, whose miss is not looked at
 POLISH = 1e-8  # [m and rad] solve this far: the last steps are quadratic, and near a fold joints need it
 SLOW = 0.95  # a step that leaves more of the miss than this is slow,
 PATIENCE = 6  # and so many in a row, the goal still missed, mean that it is out of reach
@@ -41,13 +46,12 @@ FEW_ITERATIONS = 12
 FOLD_STEP = 1e-4  # [rad] of the finite difference across the fold
 
 
-@dataclass(frozen=True, eq=False)
-class Goal:
+class Goal(NamedTuple):
     """A pose and, if commanded, redundancy values to reach."""
 
     T_base_ee: Array  # (4, 4)
     redundancy: Redundancy | None = None
-    values: Vector = field(default_factory=lambda: np.zeros(0))  # (m,) of the redundancy
+    values: Vector = np.zeros(0)  # (m,) of the redundancy
 
     @property
     def held(self) -> tuple[int, ...]:
@@ -70,13 +74,13 @@ class Miss(NamedTuple):
     equations: tuple[Array, Vector] | None = None  # scaled derivative (m, n) [m/rad], and the lengths to go (m,) [m]
 
 
-@dataclass(frozen=True)
-class Attempt:
+class Attempt(NamedTuple):
     """Result of a run of iterations."""
 
     q: Vector  # (n,) [rad]
     miss: Miss
     moving: bool  # it was still getting closer
+    clear: bool = False  # no fold is near
 
     @property
     def reached(self) -> bool:
@@ -101,8 +105,16 @@ class LocalSearch:
         program = self._program(goal, posture is not None)
         program.aim(goal.T_base_ee, posture)
         moving, iters, caution, slow = True, 0, 1.0, 0
-        miss = self._miss(goal, q)
+        by_newton = posture is None and self._determined(goal)
+        miss = self._miss(program, goal, q)
         while moving and iters < limit and (posture is not None or miss.size > POLISH):
+            if by_newton and iters and miss.size <= CLOSE:
+                found = self._newton(program, goal, q, miss)
+                if found is not None:
+                    self.iterations += iters
+                    return found
+                by_newton = False
+                program.place(q)
             try:
                 damping = caution * DAMPING_GROWTH * miss.size**2 if self._damped else 0.0
                 moved = program.step(q, damping, miss.equations)
@@ -110,25 +122,59 @@ class LocalSearch:
                 moving = False
                 break
             iters += 1
-            self.iterations += 1
-            missed = self._miss(goal, moved)
+            missed = self._miss(program, goal, moved)
             slow = slow + 1 if missed.size > max(SLOW * miss.size, POSITION_TOLERANCE) else 0
-            moving = bool(np.abs(moved - q).max() >= STALL) and (posture is not None or slow < PATIENCE)
+            moving = max(map(abs, (moved - q).tolist())) >= STALL and (posture is not None or slow < PATIENCE)
             if self._damped and posture is None and missed.size > miss.size:
                 caution *= CAUTION  # overshot: try a shorter step from the same place
+                program.place(q)
             else:
                 q, miss, caution = moved, missed, max(1.0, caution / CAUTION)
+        self.iterations += iters
         return Attempt(q, miss, moving)
 
-    def _miss(self, goal: Goal, q: Vector) -> Miss:
-        pos_err, rot_err = self._kinematics.pose_error(goal.T_base_ee, q)
+    def _newton(self, program: PoseQp, goal: Goal, q: Vector, miss: Miss) -> Attempt | None:
+        """The solution that Newton's steps from close by lead to; None near a fold, or if a limit is in the way.
+
+        The QP's steps are the same there, and take longer. All use the derivative at q, where the program's robot is
+        placed. Its smallest singular value is no smaller than one over the Frobenius norm of the inverse; where that
+        is above ``FOLD``, with a margin for the way to go, no other solution is close by.
+        """
+        derivative = program.derivative()
+        if miss.equations is not None:
+            derivative = np.concatenate([derivative, miss.equations[0].take(program.free, axis=1)])
+        *_, inverse, failed = lapack.dgesv(  # pyright: ignore[reportAttributeAccessIssue]
+            derivative, _eye(len(derivative))
+        )
+        if failed:
+            return None
+        flat = inverse.T.ravel()
+        margin = 1.0 / math.sqrt(flat @ flat) - FOLD
+        for _ in range(NEWTON):
+            gap = program.gap()
+            step = inverse @ (gap if miss.equations is None else np.concatenate([gap, miss.equations[1]]))
+            moved = q.copy()
+            moved[program.free] += step
+            if 2.0 * math.sqrt(step @ step) > margin or self.arm.within_limits(moved).tolist() != moved.tolist():
+                return None
+            if miss.size <= LAST:
+                return Attempt(moved, miss, True, clear=True)
+            missed = self._miss(program, goal, moved)
+            if missed.size > QUICK * miss.size:
+                return None
+            q, miss = moved, missed
+        return None
+
+    def _miss(self, program: PoseQp, goal: Goal, q: Vector) -> Miss:
+        """The errors at q, where the program's robot is placed."""
+        pos_err, rot_err = program.place(q)
         if goal.redundancy is None or not goal.equations:
             return Miss(pos_err, rot_err, math.hypot(pos_err, rot_err))
         at = goal.redundancy.linearise(q)
         turn = goal.redundancy.difference(at.values, goal.values)
         lengths = at.scale * turn
         size = math.hypot(pos_err, rot_err, *lengths.tolist())
-        return Miss(pos_err, rot_err, size, float(np.abs(turn).max()), (at.derivative, lengths))
+        return Miss(pos_err, rot_err, size, max(map(abs, turn.tolist())), (at.derivative, lengths))
 
     def retry_nearby(self, goal: Goal, seed: Vector, found: Attempt) -> Attempt | None:
         """A better solution than ``found``, from beside the seed, if there is one.
@@ -136,10 +182,10 @@ class LocalSearch:
         Starts lie along the direction in which the goal is least sensitive: where a goal close to
         the seed was missed, or met only far away, a fold or the elbow's axis lay in between.
         """
-        if not self._determined(goal) or self._miss(goal, seed).size > NEAR:
+        if not self._determined(goal) or self._miss(self._program(goal, False), goal, seed).size > NEAR:
             return None
         v = self._embedded(goal, np.linalg.svd(self.derivative(goal, seed))[2][-1])
-        starts = (np.clip(seed + share * v, self.arm.lower, self.arm.upper) for share in ASIDE)
+        starts = (self.arm.within_limits(seed + share * v) for share in ASIDE)
         attempts = [found, *(self.run(goal, start, limit=FEW_ITERATIONS) for start in starts)]
         reached = [attempt for attempt in attempts if attempt.reached]
         return min(reached, key=lambda attempt: float(np.linalg.norm(attempt.q - seed)), default=None)
@@ -150,7 +196,7 @@ class LocalSearch:
         Along the direction v that the map loses at the fold, its slope s(t) = s + t s' vanishes at
         t = -s/s', so the pose of t = 0 returns at t = -2 s/s'. From there the iterations take over.
         """
-        if not self._determined(goal):
+        if found.clear or not self._determined(goal):
             return None
         left, slopes, right = np.linalg.svd(self.derivative(goal, found.q))
         slope = float(slopes[-1])
@@ -161,7 +207,7 @@ class LocalSearch:
         change = (ahead - slope) / FOLD_STEP
         if abs(change) * FOLD_REACH <= 2.0 * slope:
             return None
-        guess = np.clip(found.q - (2.0 * slope / change) * v, self.arm.lower, self.arm.upper)
+        guess = self.arm.within_limits(found.q - (2.0 * slope / change) * v)
         distance = np.linalg.norm(found.q - seed) if found.reached else np.inf
         if np.linalg.norm(guess - seed) > distance + FOLD_MARGIN:
             return None
@@ -206,6 +252,11 @@ class LocalSearch:
         if key not in self._programs:
             self._programs[key] = PoseQp(self._robot, self.arm, goal.held, posture=posture, equations=goal.equations)
         return self._programs[key]
+
+
+@lru_cache
+def _eye(size: int) -> Array:
+    return np.eye(size, order="F")
 
 
 def at_limits(arm: Arm, q: Vector) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:

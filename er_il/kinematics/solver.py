@@ -3,13 +3,15 @@
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from er_il.arms.arm import Arm, Vector
+from er_il.kinematics.batch import BatchSearch
 from er_il.kinematics.forward import ForwardKinematics
-from er_il.kinematics.redundancy import Redundancy
+from er_il.kinematics.redundancy import Array, Redundancy
 from er_il.kinematics.search import LIMIT_MARGIN, Attempt, Goal, LocalSearch
 from er_il.support.errors import ShapeError
 
@@ -25,6 +27,16 @@ class Status(StrEnum):
     LIMIT = "limit"  # reached, if a joint could pass its limit; or a commanded value beyond its own
     NOT_CONVERGED = "not_converged"  # still approaching when the iterations ran out
     JUMP = "jump"  # solved, but farther from the current posture than the arm moves in a period
+
+
+@dataclass(frozen=True, eq=False)
+class BatchResult:
+    """Joint angles found for N actions; see :class:`IkResult`."""
+
+    q: Any  # (N, n) [rad] an array of the library that the actions are of
+    status: NDArray[np.str_]  # (N,) of Status
+    pos_err: Array  # (N,) [m]
+    rot_err: Array  # (N,) [rad]
 
 
 @dataclass(frozen=True)
@@ -47,6 +59,7 @@ class Kinematics(ForwardKinematics):
 
     def __init__(self, arm: Arm, damped: bool = True) -> None:
         super().__init__(arm)
+        self._damped = damped
         self._search = LocalSearch(self, damped)
 
     def solve(
@@ -81,10 +94,10 @@ class Kinematics(ForwardKinematics):
         if wanted.shape != (len(names),):
             raise ShapeError("The redundancy's values", wanted.shape, f"({len(names)},): {', '.join(names)}")
         goal = Goal(np.asarray(T_base_ee, dtype=np.float64), redundancy, wanted)
-        start = np.clip(self._checked(seed), arm.lower, arm.upper)
+        start = arm.within_limits(self._checked(seed))
         clipped = False
         for joint, angle in zip(goal.held, wanted if goal.held else (), strict=True):
-            start[joint] = np.clip(angle, arm.lower[joint], arm.upper[joint])
+            start[joint] = min(max(angle, arm.lower[joint]), arm.upper[joint])
             clipped |= bool(abs(start[joint] - angle) > LIMIT_MARGIN)
         before = self._search.iterations
         if posture is not None:
@@ -92,7 +105,7 @@ class Kinematics(ForwardKinematics):
         found = self._search.run(goal, start)
         if posture is None:
             found = self._search.across_fold(goal, found, start) or found
-            if not found.reached or np.abs(found.q - start).max() > FAR:
+            if not found.reached or max(map(abs, (found.q - start).tolist())) > FAR:
                 found = self._search.retry_nearby(goal, start, found) or found
         if clipped:
             status = Status.LIMIT
@@ -101,6 +114,10 @@ class Kinematics(ForwardKinematics):
         else:
             status = self._why_not(found, goal)
         return IkResult(found.q, status, found.miss.position, found.miss.rotation, self._search.iterations - before)
+
+    def batch(self, redundancy: Redundancy | None) -> BatchSearch:
+        """The search for many goals at once that command a redundancy."""
+        return BatchSearch(self.arm, self.chain, self.mounted(), redundancy, self._damped)
 
     def conditioning(self, q: ArrayLike, redundancy: Redundancy | None = None) -> float:
         """Distance of a configuration q (n,) [rad] from a singularity of what is commanded.

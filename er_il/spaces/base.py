@@ -1,14 +1,17 @@
 """The interface of every action space: an invertible pair of ``encode`` and ``decode`` with named dimensions."""
 
+import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+import array_api_compat as array_api
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from er_il.arms.arm import Arm, Vector
-from er_il.kinematics.solver import IkResult, Kinematics, Status, kinematics_of
+from er_il.kinematics.chain import constant, detached, to_numpy
+from er_il.kinematics.solver import BatchResult, IkResult, Kinematics, Status, kinematics_of
 from er_il.spaces.spec import SPEC_VERSION
 from er_il.support.errors import ShapeError
 
@@ -100,10 +103,45 @@ class ArmSpace(ABC):
                 Absolute spaces do not need it.
         """
         command = checked_action(action, self.kind, self.names)
-        start, last = self._within_limits("The seed", seed), seed if current is None else current
-        if not np.all(np.isfinite(command)):
+        start = self._within_limits("The seed", seed)
+        last = start if current is None else self._within_limits("The current command", current)
+        if not math.isfinite(command.sum()):
             return IkResult(start, Status.INVALID)
-        return self._decode(command, start, self._within_limits("The current command", last))
+        return self._decode(command, start, last)
+
+    def decode_batch(self, actions: Any, seeds: Any) -> BatchResult:
+        """Decode many actions at once: the solutions and statuses of :meth:`decode`, row by row.
+
+        Where the space can, one batch solves all but the hard rows. On PyTorch tensors the joints are differentiable
+        with respect to the actions.
+
+        Args:
+            actions: (N, dim), an array of NumPy, PyTorch or another array library, in float64.
+            seeds: (N, n) [rad] the arm's measured angles, of the same library. A delta counts from them.
+        """
+        if actions.ndim != 2 or actions.shape[1] != self.dim:
+            raise ShapeError(f"{self.kind} actions", actions.shape, f"(N, {self.dim}): {', '.join(self.names)}")
+        if seeds.shape != (len(actions), self.arm.dof):
+            raise ShapeError("The seeds", seeds.shape, f"({len(actions)}, {self.arm.dof})")
+        q, solved = self._solve_batch(detached(actions), detached(seeds))
+        result = BatchResult(q, np.full(len(q), Status.OK, dtype="U16"), np.zeros(len(q)), np.zeros(len(q)))
+        host_actions, host_seeds = to_numpy(actions), to_numpy(seeds)
+        for row in np.flatnonzero(~to_numpy(solved)):
+            decoded = self.decode(host_actions[row], host_seeds[row])
+            q[row] = constant(decoded.q, q)
+            result.status[row] = decoded.status
+            result.pos_err[row], result.rot_err[row] = decoded.pos_err, decoded.rot_err
+        followed = self._follow(q, actions, result.status)
+        return result if followed is None else replace(result, q=followed)
+
+    def _solve_batch(self, actions: Any, seeds: Any) -> tuple[Any, Any]:
+        """Joint angles (N, n) [rad], and a mask (N,) of the rows that were decoded; the others are decoded singly."""
+        xp = array_api.array_namespace(actions)
+        return xp.asarray(seeds, copy=True), xp.zeros((len(actions),), dtype=xp.bool)
+
+    def _follow(self, q: Any, actions: Any, status: NDArray[np.str_]) -> Any:
+        """The solutions q (N, n) as functions of the actions, for automatic derivatives; None if there are none."""
+        return None
 
     def ease(self, action: ArrayLike, seed: Vector, within: Vector, current: Vector) -> Vector | None:
         """Joint angles (n,) [rad] near a seed that do as much of an action as lies on the way; None if there are none.
@@ -139,7 +177,7 @@ class ArmSpace(ABC):
         given = np.asarray(angles, dtype=np.float64)
         if given.shape != (self.arm.dof,):
             raise ShapeError(what, given.shape, f"({self.arm.dof},)")
-        return np.clip(given, self.arm.lower, self.arm.upper)
+        return self.arm.within_limits(given)
 
 
 def checked_action(action: ArrayLike, kind: str, names: tuple[str, ...]) -> Vector:

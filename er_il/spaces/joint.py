@@ -3,9 +3,11 @@
 from dataclasses import dataclass
 from typing import Any
 
+import array_api_compat as array_api
 import numpy as np
 
 from er_il.arms.arm import Vector
+from er_il.kinematics.chain import constant
 from er_il.kinematics.search import LIMIT_MARGIN
 from er_il.kinematics.solver import IkResult, Status
 from er_il.spaces.base import ArmSpace, Array
@@ -29,9 +31,14 @@ class JointSpace(ArmSpace):
         return q
 
     def _decode(self, action: Vector, seed: Vector, current: Vector) -> IkResult:
-        q = np.clip(action, self.arm.lower, self.arm.upper)
+        q = self.arm.within_limits(action)
         inside = np.all(np.abs(q - action) <= LIMIT_MARGIN)
         return IkResult(q, Status.OK if inside else Status.LIMIT)
+
+    def _solve_batch(self, actions: Any, seeds: Any) -> tuple[Any, Any]:
+        xp = array_api.array_namespace(actions)
+        inside = (actions >= constant(self.arm.lower, actions)) & (actions <= constant(self.arm.upper, actions))
+        return xp.asarray(actions, copy=True), xp.all(inside, axis=1)
 
     def _details(self) -> dict[str, Any]:
         return {}

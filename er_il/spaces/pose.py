@@ -1,19 +1,24 @@
 """Task space and the ER spaces: an end-effector pose, then the values of a redundancy, if any (paper III-A, IV)."""
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, Self
 
+import array_api_compat as array_api
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from er_il.arms.arm import Vector
+from er_il.kinematics.batch import BatchGoal
+from er_il.kinematics.chain import chunks, constant
 from er_il.kinematics.redundancy import Redundancy
 from er_il.kinematics.rotation import Quaternion, RotationCode, RotationError
-from er_il.kinematics.solver import IkResult, Kinematics, Status, kinematics_of
+from er_il.kinematics.solver import FAR, IkResult, Kinematics, Status, kinematics_of
 from er_il.spaces.base import ArmSpace, Array
 
 POSITION_NAMES = ("ee.x", "ee.y", "ee.z")
 TASK = "task"
+IDENTITY = np.eye(4)
 EASED = (0.5, 0.2, 0.1, 0.0)  # shares of the way to a redundancy value that is too far
 POSTURE_PULL = 0.05  # [rad] of the joint farthest from the posture; at 20 Hz, half a Panda's full speed
 
@@ -50,6 +55,10 @@ class PoseSpace(ArmSpace):
 
     @property
     def names(self) -> tuple[str, ...]:
+        return self._names
+
+    @cached_property
+    def _names(self) -> tuple[str, ...]:
         return (*POSITION_NAMES, *self.rotation.names, *self.redundancy_names)
 
     def redundancy_along(self, q: Array) -> Array:
@@ -88,7 +97,7 @@ class PoseSpace(ArmSpace):
         """
         if self.redundancy is None:
             return None
-        start = np.clip(seed, self.arm.lower, self.arm.upper)
+        start = self.arm.within_limits(seed)
         present = self.redundancy.along(start[None])[0]
         for share in EASED:
             ik = self.solve(T_base_ee, present + share * self.redundancy.difference(present, values), start)
@@ -106,11 +115,16 @@ class PoseSpace(ArmSpace):
         Raises:
             RotationError: its rotation is none.
         """
-        split = len(POSITION_NAMES) + len(self.rotation.names)
-        T_base_ee = np.eye(4)
+        split = self._split
+        T_base_ee = IDENTITY.copy()
         T_base_ee[:3, 3] = action[:3]
         T_base_ee[:3, :3] = self.rotation.decode(action[3:split])
         return T_base_ee, action[split:]
+
+    @cached_property
+    def _split(self) -> int:
+        """Number of dimensions of the pose."""
+        return len(POSITION_NAMES) + len(self.rotation.names)
 
     def _encode(self, q: Array) -> Array:
         T_base_ee = self.kinematics.fk_batch(q)
@@ -123,6 +137,42 @@ class PoseSpace(ArmSpace):
         except RotationError:
             return IkResult(seed, Status.INVALID)
         return self.solve(T_base_ee, values, seed)
+
+    def _solve_batch(self, actions: Any, seeds: Any) -> tuple[Any, Any]:
+        if self.posture is not None:  # two searches, the first with a posture: left to the program
+            return super()._solve_batch(actions, seeds)
+        xp = array_api.array_namespace(actions)
+        finite = xp.all(xp.isfinite(actions), axis=1)
+        goal, rotates = self._goals(xp.where(finite[:, None], actions, 0.0), xp)
+        lower, upper = constant(self.arm.lower, seeds), constant(self.arm.upper, seeds)
+        starts = xp.minimum(xp.maximum(seeds, lower), upper)
+        usable = finite & rotates
+        held = () if self.redundancy is None else self.redundancy.held
+        for joint, value in zip(held, goal.values, strict=False):
+            usable = usable & (value >= lower[joint]) & (value <= upper[joint])
+            starts[:, joint] = xp.where(usable, value, starts[:, joint])
+        q, solved = starts, xp.zeros((len(actions),), dtype=xp.bool, device=array_api.device(actions))
+        search, rows = self.kinematics.batch(self.redundancy), xp.nonzero(usable)[0]
+        for chunk in chunks(len(rows)):
+            some = rows[chunk]
+            q[some], solved[some] = search.run(goal.rows(some), starts[some], FAR)
+        return q, solved
+
+    def _follow(self, q: Any, actions: Any, status: NDArray[np.str_]) -> Any:
+        if not (array_api.is_torch_array(actions) and actions.requires_grad):
+            return None
+        xp = array_api.array_namespace(actions)
+        rows = xp.asarray(np.flatnonzero(status == Status.OK), device=array_api.device(actions))
+        goal, _ = self._goals(actions[rows], xp)
+        followed = xp.asarray(q, copy=True)
+        followed[rows] = self.kinematics.batch(self.redundancy).last_step(goal, q[rows])
+        return followed
+
+    def _goals(self, actions: Any, xp: Any) -> tuple[BatchGoal, Any]:
+        """The goals of actions (N, dim), and a mask (N,) of those whose rotation is one."""
+        rows = actions.T
+        R, rotates = self.rotation.decode_batch(rows[3 : self._split], xp)
+        return BatchGoal(R, rows[:3], rows[self._split :]), rotates
 
     def _details(self) -> dict[str, Any]:
         details: dict[str, Any] = {"rotation": self.rotation.kind}

@@ -63,7 +63,7 @@ def round_trips(space: ArmSpace, count: int, *, seed_error: float = 0.1, rng_see
 def round_trip(space: ArmSpace, q: Vector, seed_error: float, rng: np.random.Generator) -> RoundTrip:
     """Encode a configuration (n,) [rad] and decode it from a seed within ``seed_error`` [rad] of each joint."""
     arm = space.arm
-    seed = np.clip(q + rng.uniform(-seed_error, seed_error, arm.dof), arm.lower, arm.upper)
+    seed = arm.within_limits(q + rng.uniform(-seed_error, seed_error, arm.dof))
     action = space.encode(q)
     decoded = space.decode(action, seed)
     return RoundTrip(q, seed, decoded, space.conditioning(q), bool(np.any(at_limits(arm, decoded.q))))
