@@ -17,11 +17,11 @@ PANDA = Arm.preset("panda")
 def assert_returns_joints(space: ActionSpace, trips: list[RoundTrip], share: float) -> None:
     exact = [trip for trip in trips if trip.exact]
     assert len(exact) / len(trips) >= share
-    assert all(trip.decoded.status is Status.OK for trip in exact)
+    assert all(trip.status is Status.OK for trip in exact)
     assert all(trip.cause != UNEXPLAINED for trip in trips)
     for trip in trips:
-        if trip.decoded.status is Status.OK:
-            assert max(space.kinematics.pose_error(space.fk(trip.q), trip.decoded.q)) < 1e-3
+        if trip.status is Status.OK:
+            assert max(space.kinematics.pose_error(space.fk(trip.q), trip.found)) < 1e-3
 
 
 # ---------------------------------------------------------------- the leading property
@@ -29,8 +29,8 @@ def assert_returns_joints(space: ActionSpace, trips: list[RoundTrip], share: flo
 
 def test_joint_space_returns_the_joints_always():
     for trip in round_trips(make_action_space("joint", PANDA).arm_space, 100):
-        np.testing.assert_array_equal(trip.decoded.q, trip.q)
-        assert trip.decoded.status is Status.OK
+        np.testing.assert_array_equal(trip.found, trip.q)
+        assert trip.status is Status.OK
 
 
 @pytest.mark.parametrize("rotation", ["quat", "rot6d"])

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er_il.datasets.dataset import Dataset
-from er_il.kinematics.solver import Status
+from er_il.kinematics.solver import BatchResult
 from er_il.spaces.layout import Layout
 from er_il.spaces.spec import ACTION
 from er_il.support.workers import StatefulWorkers
@@ -40,30 +40,47 @@ class DecodedEpisode:
 
 
 def decode_episode(layout: Layout, episode: EncodedEpisode) -> DecodedEpisode:
-    """Decode an episode in time order.
+    """Decode an episode.
 
-    Seeds are the measured joints, as on a robot; without them the joint vector of the step before.
+    Seeds are the measured joints, as on a robot; without them the joint vector of the step before, which is decoded
+    first where it is not known.
     """
-    length, parts = len(episode.actions), len(layout.parts)
-    result = DecodedEpisode(
-        np.empty((length, len(layout.names))),
-        np.full((length, parts), Status.OK, dtype="U16"),
-        np.zeros((length, parts)),
-        np.zeros((length, parts)),
-        np.full((length, parts), np.inf),
+    known = _known(layout, episode)
+    if known is None:
+        vectors, results = _decode_in_turn(layout, episode)
+    else:
+        vectors, results = layout.decode_batch(episode.actions, *known)
+    at = vectors if episode.truth is None else episode.truth
+    conditioning = [part.space.conditionings(layout.angles(part, at)) for part in layout.parts]
+    return DecodedEpisode(
+        vectors,
+        np.stack([result.status for result in results], axis=1),
+        np.stack([result.pos_err for result in results], axis=1),
+        np.stack([result.rot_err for result in results], axis=1),
+        np.stack(conditioning, axis=1),
     )
-    last = home_vector(layout) if episode.truth is None else episode.truth[0]
-    if episode.truth is None and episode.state is not None:
-        last = episode.state[0]
+
+
+def _known(layout: Layout, episode: EncodedEpisode) -> tuple[Array, Array] | None:
+    """Seeds and last commands (T, D), if no step has to be decoded before another."""
+    if episode.truth is not None:
+        before = np.concatenate([episode.truth[:1], episode.truth[:-1]])
+        return before if episode.state is None else episode.state, before
+    if episode.state is not None and not any(part.space.relative for part in layout.parts):
+        return episode.state, episode.state
+    return None
+
+
+def _decode_in_turn(layout: Layout, episode: EncodedEpisode) -> tuple[Array, list[BatchResult]]:
+    """Decode in time order, each step from the joint vector of the last."""
+    last = home_vector(layout) if episode.state is None else episode.state[0]
+    steps = []
     for t, action in enumerate(episode.actions):
-        decoded = layout.decode(action, last if episode.state is None else episode.state[t], last)
-        result.vectors[t] = decoded.vector
-        last = decoded.vector if episode.truth is None else episode.truth[t]
-        for p, (part, arm) in enumerate(zip(layout.parts, decoded.parts, strict=True)):
-            result.status[t, p] = arm.status
-            result.position_error[t, p], result.rotation_error[t, p] = arm.pos_err, arm.rot_err
-            result.conditioning[t, p] = part.space.conditioning(layout.angles(part, last))
-    return result
+        steps.append(layout.decode(action, last if episode.state is None else episode.state[t], last))
+        last = steps[-1].vector
+    return np.array([step.vector for step in steps]), [
+        BatchResult.of(part) for part in zip(*(step.parts for step in steps), strict=True)
+    ]
 
 
 def decode_episodes(
@@ -72,8 +89,15 @@ def decode_episodes(
     workers: int,
     advance: Callable[[int], object] = lambda frames: None,
 ) -> list[DecodedEpisode]:
-    """Decode episodes, in worker processes if they are long; ``advance`` is told how many frames are done."""
-    frames = sum(len(episode.actions) for episode in episodes)
+    """Decode episodes, in worker processes if they are long and their steps depend on one another.
+
+    Args:
+        layout: What the vectors mean.
+        episodes: The episodes.
+        workers: Number of worker processes.
+        advance: Called with the number of frames done since the last call.
+    """
+    frames = sum(len(episode.actions) for episode in episodes if _known(layout, episode) is None)
     decoded = []
     with StatefulWorkers(workers if frames > FEW_FRAMES else 1, partial(Layout.from_spec, layout.spec())) as pool:
         for result in [pool.submit(decode_episode, episode) for episode in episodes]:

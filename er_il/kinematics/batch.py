@@ -95,12 +95,23 @@ class BatchSearch:
         xp = array_api.array_namespace(walk.q)
         R, p = walk.pose(self.ee)
         turn, angle = _rotation_vector(goal.R, R, xp)
-        error, derivative = xp.concat([goal.p - p, turn], axis=0), walk.jacobian(self.ee)
-        if self.redundancy is not None and not self.redundancy.held:
-            values, scale, slope = self.redundancy.linearise_batch(walk)
-            change = scale * self.redundancy.difference(values, goal.values)
-            error, derivative = xp.concat([error, change], axis=0), xp.concat([derivative, slope], axis=0)
-        return error, derivative[:, self._free, :], angle
+        error = xp.concat([goal.p - p, turn], axis=0)
+        if self.redundancy is None or self.redundancy.held:
+            return error, self._by_free(walk), angle
+        values, scale, slope = self.redundancy.linearise_batch(walk)
+        change = scale * self.redundancy.difference(values, goal.values)
+        return xp.concat([error, change], axis=0), self._by_free(walk, slope), angle
+
+    def derivative(self, walk: Walk) -> Any:
+        """Derivative (k, free joints, N) of the pose and the scaled redundancy."""
+        if self.redundancy is None or self.redundancy.held:
+            return self._by_free(walk)
+        return self._by_free(walk, self.redundancy.linearise_batch(walk)[2])
+
+    def _by_free(self, walk: Walk, *more: Any) -> Any:
+        """Rows of the pose's derivative and of others (., n, N), by the free joints."""
+        xp = array_api.array_namespace(walk.q)
+        return xp.concat([walk.jacobian(self.ee), *more], axis=0)[:, self._free, :]
 
     def step(self, error: Any, derivative: Any, damping: Any) -> Any:
         """The change dq (free joints, N) that minimises ``|J dq - e|^2 + damping |dq|^2``."""

@@ -1,5 +1,6 @@
 """Kinematics of an arm: Pinocchio's forward kinematics, and inverse kinematics by Placo's QP."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import lru_cache
@@ -10,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from er_il.arms.arm import Arm, Vector
 from er_il.kinematics.batch import BatchSearch
+from er_il.kinematics.chain import chunks
 from er_il.kinematics.forward import ForwardKinematics
 from er_il.kinematics.redundancy import Array, Redundancy
 from er_il.kinematics.search import LIMIT_MARGIN, Attempt, Goal, LocalSearch
@@ -37,6 +39,16 @@ class BatchResult:
     status: NDArray[np.str_]  # (N,) of Status
     pos_err: Array  # (N,) [m]
     rot_err: Array  # (N,) [rad]
+
+    @classmethod
+    def of(cls, results: "Sequence[IkResult]") -> "BatchResult":
+        """Results of the single solver, one after the other."""
+        return cls(
+            np.array([each.q for each in results]),
+            np.array([each.status for each in results], dtype="U16"),
+            np.array([each.pos_err for each in results]),
+            np.array([each.rot_err for each in results]),
+        )
 
 
 @dataclass(frozen=True)
@@ -128,6 +140,14 @@ class Kinematics(ForwardKinematics):
         """
         goal = Goal(np.eye(4), redundancy)
         return float(np.linalg.svd(self._search.derivative(goal, self._checked(q)), compute_uv=False)[-1])
+
+    def conditionings(self, q: Array, redundancy: Redundancy | None = None) -> Vector:
+        """:meth:`conditioning` (N,) of many configurations q (N, n) [rad]."""
+        search, smallest = self.batch(redundancy), np.empty(len(q))
+        for rows in chunks(len(q)):
+            derivative = search.derivative(self.chain.walk(q[rows])).transpose(2, 0, 1)
+            smallest[rows] = np.linalg.svd(derivative, compute_uv=False)[:, -1]
+        return smallest
 
     def _why_not(self, attempt: Attempt, goal: Goal) -> Status:
         if not self.within_reach(goal.T_base_ee[:3, 3]):

@@ -52,6 +52,11 @@ class ArmSpace(ABC):
         return len(self.names)
 
     @property
+    def relative(self) -> bool:
+        """True if actions count from the last command."""
+        return False
+
+    @property
     def bounds(self) -> tuple[Vector, Vector]:
         """Lowest and highest value (dim,) of each dimension; infinite where the space declares none."""
         return np.full(self.dim, -np.inf), np.full(self.dim, np.inf)
@@ -69,11 +74,12 @@ class ArmSpace(ABC):
         """Distance of q (n,) [rad] from a singularity of the space; infinite where decoding solves nothing."""
         return np.inf
 
-    def encode(self, q: ArrayLike, start: ArrayLike | None = None) -> Array:
+    def encode(self, q: Any, start: ArrayLike | None = None) -> Any:
         """Encode joint angles as actions.
 
         Args:
-            q: (n,) [rad], or a trajectory (N, n) in time order: rotations are kept continuous along it.
+            q: (n,) [rad], or a trajectory (N, n) in time order: rotations are kept continuous along it. Of a PyTorch
+                tensor the actions are one, too, in float64 on the same device.
             start: (n,) [rad] command before the first, which a delta counts from; the first itself if omitted.
 
         Returns:
@@ -82,6 +88,8 @@ class ArmSpace(ABC):
         Raises:
             BoundsError: a delta is larger than its bounds, so that its decoding would not lead there.
         """
+        if array_api.is_torch_array(q):
+            return constant(self.encode(to_numpy(q), start), q.double())
         angles = np.asarray(q, dtype=np.float64)
         if angles.ndim not in (1, 2) or angles.shape[-1] != self.arm.dof:
             raise ShapeError("Joint angles", angles.shape, f"({self.arm.dof},) or (N, {self.arm.dof})")
@@ -109,25 +117,34 @@ class ArmSpace(ABC):
             return IkResult(start, Status.INVALID)
         return self._decode(command, start, last)
 
-    def decode_batch(self, actions: Any, seeds: Any) -> BatchResult:
+    def conditionings(self, q: Array) -> Vector:
+        """:meth:`conditioning` (N,) of many configurations q (N, n) [rad]."""
+        return np.full(len(q), np.inf)
+
+    def decode_batch(self, actions: Any, seeds: Any, currents: Any = None) -> BatchResult:
         """Decode many actions at once: the solutions and statuses of :meth:`decode`, row by row.
 
         Where the space can, one batch solves all but the hard rows. On PyTorch tensors the joints are differentiable
         with respect to the actions.
 
         Args:
-            actions: (N, dim), an array of NumPy, PyTorch or another array library, in float64.
-            seeds: (N, n) [rad] the arm's measured angles, of the same library. A delta counts from them.
+            actions: (N, dim), an array of NumPy, PyTorch or another array library; computed with in float64.
+            seeds: (N, n) [rad] the arm's measured angles, of the same library.
+            currents: (N, n) [rad] the last commands, which deltas count from; the seeds if omitted.
         """
+        xp = array_api.array_namespace(actions, seeds)
+        actions, seeds = xp.astype(actions, xp.float64), xp.astype(seeds, xp.float64)
+        currents = seeds if currents is None else xp.astype(currents, xp.float64)
         if actions.ndim != 2 or actions.shape[1] != self.dim:
             raise ShapeError(f"{self.kind} actions", actions.shape, f"(N, {self.dim}): {', '.join(self.names)}")
-        if seeds.shape != (len(actions), self.arm.dof):
-            raise ShapeError("The seeds", seeds.shape, f"({len(actions)}, {self.arm.dof})")
+        for what, angles in (("The seeds", seeds), ("The current commands", currents)):
+            if angles.shape != (len(actions), self.arm.dof):
+                raise ShapeError(what, angles.shape, f"({len(actions)}, {self.arm.dof})")
         q, solved = self._solve_batch(detached(actions), detached(seeds))
         result = BatchResult(q, np.full(len(q), Status.OK, dtype="U16"), np.zeros(len(q)), np.zeros(len(q)))
-        host_actions, host_seeds = to_numpy(actions), to_numpy(seeds)
+        rows = to_numpy(actions), to_numpy(seeds), to_numpy(currents)
         for row in np.flatnonzero(~to_numpy(solved)):
-            decoded = self.decode(host_actions[row], host_seeds[row])
+            decoded = self.decode(*(each[row] for each in rows))
             q[row] = constant(decoded.q, q)
             result.status[row] = decoded.status
             result.pos_err[row], result.rot_err[row] = decoded.pos_err, decoded.rot_err

@@ -60,6 +60,10 @@ class DeltaSpace(ArmSpace):
         return _changes(self.absolute.names)
 
     @property
+    def relative(self) -> bool:
+        return True
+
+    @property
     def limits(self) -> Vector:
         """Largest magnitude (dim,) of each dimension [m or rad]."""
         bounds = self.delta_bounds
@@ -74,6 +78,9 @@ class DeltaSpace(ArmSpace):
 
     def conditioning(self, q: ArrayLike) -> float:
         return self.absolute.conditioning(q)
+
+    def conditionings(self, q: Array) -> Vector:
+        return self.absolute.conditionings(q)
 
     def ease(self, action: ArrayLike, seed: Vector, within: Vector, current: Vector) -> Vector | None:
         if not isinstance(self.absolute, PoseSpace):

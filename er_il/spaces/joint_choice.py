@@ -27,7 +27,7 @@ from er_il.kinematics.solver import Status, kinematics_of
 from er_il.spaces.base import Array
 from er_il.spaces.pose import PoseSpace
 from er_il.spaces.registry import ERJ, make_arm_space
-from er_il.spaces.round_trip import SINGULAR, round_trip
+from er_il.spaces.round_trip import SINGULAR, round_trips_of
 from er_il.support.errors import ArmError
 
 Choice = tuple[str, ...]  # the n-6 joints that ERJ commands
@@ -92,9 +92,9 @@ def choices(arm: Arm) -> list[Choice]:
 def sensitivity(redundancy: Redundancy, q: Array) -> Sensitivity:
     """What a redundancy leaves to IK at configurations q (N, n) [rad]."""
     kinematics = kinematics_of(redundancy.arm)
-    jacobians = np.array([kinematics.jacobian(each) for each in q])  # (N, 6, n)
+    jacobians = kinematics.jacobians(q)  # (N, 6, n)
     jacobians[:, :3] /= LENGTH
-    derivative = np.array([redundancy.linearise(each).derivative for each in q])  # (N, m, n)
+    derivative = redundancy.linearise_batch(kinematics.chain.walk(q))[2].transpose(2, 0, 1)  # (N, m, n)
     left = jacobians if redundancy.held else np.concatenate([jacobians, derivative], axis=1)
     left = np.delete(left, list(redundancy.held), axis=2)
     values = np.asarray(np.linalg.svd(left, compute_uv=False), dtype=np.float64)
@@ -177,9 +177,10 @@ def _space(arm: Arm, choice: Choice) -> PoseSpace:
 
 def _fitness(arm: Arm, choice: Choice, q: Array, sensitivity: Sensitivity, risky: NDArray[np.bool_]) -> Fitness:
     """What is measured over the workspace and along demos alike; ``risky`` (N,) marks what counts as risk."""
-    space, rng = _space(arm, choice), np.random.default_rng(0)
+    space = _space(arm, choice)
     rows = np.unique(np.linspace(0, len(q) - 1, ROUND_TRIPS).astype(int))
-    missed = [trip for trip in (round_trip(space, q[row], SEED_ERROR, rng) for row in rows) if not trip.exact]
+    errors = np.random.default_rng(0).uniform(-SEED_ERROR, SEED_ERROR, (len(rows), arm.dof))
+    missed = [trip for trip in round_trips_of(space, q[rows], errors) if not trip.exact]
     low, middle = np.percentile(sensitivity.smallest, [5, 50]).tolist()
     return Fitness(
         joints=choice,
@@ -190,6 +191,6 @@ def _fitness(arm: Arm, choice: Choice, q: Array, sensitivity: Sensitivity, risky
         self_motion=float(np.abs(sensitivity.self_motion).mean()),
         near_singular=float((sensitivity.smallest < SINGULAR).mean()),
         missed=len(missed) / len(rows),
-        flipped=sum(trip.decoded.status is Status.OK for trip in missed) / len(rows),
+        flipped=sum(trip.status is Status.OK for trip in missed) / len(rows),
         risk=float(risky.mean()),
     )

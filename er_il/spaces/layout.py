@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from er_il.arms.portable import arm_from_spec, arm_spec
-from er_il.kinematics.solver import IkResult
+from er_il.kinematics.solver import BatchResult, IkResult
 from er_il.spaces.base import ArmSpace
 from er_il.spaces.joint import JOINT, JointSpace
 from er_il.spaces.motors import Motors
@@ -173,6 +173,22 @@ class Layout:
         seeds, lasts = self.split(start)[0], self.split(last)[0]
         decoded = tuple(part.space.decode(*each) for part, *each in zip(self.parts, actions, seeds, lasts, strict=True))
         return LayoutDecoded(self.join([each.q for each in decoded], others), decoded)
+
+    def decode_batch(self, actions: Array, seeds: Array, currents: Array) -> tuple[Array, list[BatchResult]]:
+        """Decode many encoded vectors to joint vectors; see :meth:`er_il.spaces.base.ArmSpace.decode_batch`.
+
+        Args:
+            actions: (N, len(encoded_names)).
+            seeds: (N, D) measured values; those of dimensions that belong to no arm are not read.
+            currents: (N, D) the last commands.
+
+        Returns:
+            Joint vectors (N, D), and the result of each arm.
+        """
+        own, others = self.split_encoded(actions)
+        of_arms = zip(self.parts, own, self.split(seeds)[0], self.split(currents)[0], strict=True)
+        results = [part.space.decode_batch(*each) for part, *each in of_arms]
+        return self.join([result.q for result in results], others), results
 
     @cached_property
     def _others(self) -> list[int]:

@@ -68,6 +68,9 @@ class PoseSpace(ArmSpace):
     def conditioning(self, q: ArrayLike) -> float:
         return self.kinematics.conditioning(q, self.redundancy)
 
+    def conditionings(self, q: Array) -> Vector:
+        return self.kinematics.conditionings(q, self.redundancy)
+
     def solve(self, T_base_ee: Array, values: Vector, seed: Vector) -> IkResult:
         """Find joint angles with a pose (4, 4) and redundancy values (m,), near a seed (n,) [rad]."""
         if self.posture is None:
