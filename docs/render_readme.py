@@ -21,6 +21,7 @@ BLOCK = re.compile(r"(<!-- (results/\w+) -->\n).*?(<!-- /\2 -->)", re.DOTALL)
 
 # Template of a report's table, by a key that only such reports have.
 TABLES = {
+    "decodes": "decode",
     "drives": "drift",
     "drifts": "deltas",
     "round_trips": "round_trips",

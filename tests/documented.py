@@ -23,6 +23,7 @@ PAGES = (
 
 _BLOCK = re.compile(r"^(?:<!-- (?P<marker>[^>]*) -->\n)? *```(?P<language>\w+)\n(?P<text>.*?)^ *```$", re.M | re.S)
 _RUNNER = ("uv", "run")
+_WITH_VALUE = {"--group"}  # of its options
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ class Block:
                 if tuple(command[:2]) == _RUNNER:
                     command = command[2:]
                     while command[0].startswith("-"):
-                        command = command[1:]
+                        command = command[2 if command[0] in _WITH_VALUE else 1 :]
                 commands.append(command)
         return commands
 

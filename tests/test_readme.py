@@ -21,9 +21,14 @@ def test_the_pages_tables_are_rendered_from_the_results() -> None:
         found += [name for _, name, _ in renderer["BLOCK"].findall(text)]
         assert renderer["rendered"](text) == text, "run docs/render_readme.py"
     assert {"results/table1", "results/demo", "results/circle", "results/replay", "results/lift_cup"} <= set(found)
-    assert {"results/joints", "results/validity", "results/deltas", "results/panda8", "results/training_time"} <= set(
-        found
-    )
+    assert {
+        "results/decode",
+        "results/joints",
+        "results/validity",
+        "results/deltas",
+        "results/panda8",
+        "results/training_time",
+    } <= set(found)
 
 
 @pytest.mark.parametrize("name", [path.parent.name for path in sorted(ROOT.glob("results/*/results.json"))])
