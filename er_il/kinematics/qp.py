@@ -78,6 +78,24 @@ class PoseQp:
         self._state[self._order] = q
         self._robot.state.q = self._state
         self._robot.update_kinematics()
+        return self._errors()
+
+    def advance(self, q: Vector, equations: tuple[Array, Vector] | None) -> tuple[float, float]:
+        """Let the program itself move the robot by a step from q without more damping; returns as :meth:`place` does.
+
+        Raises:
+            RuntimeError: the program has no solution.
+        """
+        self._configure(0.0, q, equations)
+        self._program.solve(True)
+        self._robot.update_kinematics()
+        return self._errors()
+
+    def read(self) -> Vector:
+        """Joint angles (n,) [rad] of the robot."""
+        return np.array(self._robot.state.q).take(self._order)
+
+    def _errors(self) -> tuple[float, float]:
         self._position.update()
         self._orientation.update()
         return self._position.error_norm(), self._orientation.error_norm()
@@ -101,8 +119,16 @@ class PoseQp:
         Raises:
             RuntimeError: the program has no solution.
         """
-        if damping < NO_DAMPING:
-            damping = 0.0
+        self._configure(damping if damping >= NO_DAMPING else 0.0, q, equations)
+        dq = self._program.solve(False)[self._velocities]
+        longest = max(map(abs, dq.tolist()))
+        if longest > MAX_STEP:
+            dq *= MAX_STEP / longest
+        dq += q
+        np.maximum(dq, self._lower, out=dq)  # the program keeps limits to its own tolerance
+        return np.minimum(dq, self._upper, out=dq)
+
+    def _configure(self, damping: float, q: Vector, equations: tuple[Array, Vector] | None) -> None:
         if damping != self._damped:
             self._damping.configure("damping", "soft", MIN_DAMPING + damping)
             self._damped = damping
@@ -113,10 +139,3 @@ class PoseQp:
             self._rows[m:, self._order] = -matrix
             goal = matrix @ q + change
             self._equations.A, self._equations.b = self._rows, np.concatenate([goal, -goal])
-        dq = self._program.solve(False)[self._velocities]
-        longest = max(map(abs, dq.tolist()))
-        if longest > MAX_STEP:
-            dq *= MAX_STEP / longest
-        dq += q
-        np.maximum(dq, self._lower, out=dq)  # the program keeps limits to its own tolerance
-        return np.minimum(dq, self._upper, out=dq)

@@ -20,7 +20,7 @@ from scipy.linalg import lapack
 
 from er_il.arms.arm import POSE_DOF, Arm, Vector
 from er_il.kinematics.forward import ForwardKinematics
-from er_il.kinematics.qp import PoseQp
+from er_il.kinematics.qp import MAX_STEP, PoseQp
 from er_il.kinematics.redundancy import Array, Redundancy
 
 POSITION_TOLERANCE = 1e-4  # [m]
@@ -28,10 +28,9 @@ ROTATION_TOLERANCE = 1e-3  # [rad]
 MAX_ITERATIONS = 50
 DAMPING_GROWTH = 1e-2  # [1] damping per squared miss in m and rad
 CAUTION = 10.0  # damping grows by this factor after a step that overshot, and shrinks after one that did not
-CLOSE = 1e-2  # [m and rad] from here, where no fold is near, Newton's steps end the search:
-NEWTON = 4  # at most so many,
-QUICK = 0.1  # each leaving at most so much of the miss,
-LAST = 3e-6  # [m and rad] and from here the last, whose miss is not looked at
+CLOSE = 0.2  # [m and rad] goals so close to the seed are tried by quick steps:
+QUICK = 5  # at most so many looks at what is left, each at most half of the one before,
+LAST = 3e-6  # [m and rad] from here by a last step, whose end is not looked at
 POLISH = 1e-8  # [m and rad] solve this far: the last steps are quadratic, and near a fold joints need it
 SLOW = 0.95  # a step that leaves more of the miss than this is slow,
 PATIENCE = 6  # and so many in a row, the goal still missed, mean that it is out of reach
@@ -100,21 +99,60 @@ class LocalSearch:
         self._robot = placo.RobotWrapper("", placo.Flags.ignore_collisions, self.arm.model_xml)
         self._programs: dict[tuple[tuple[int, ...], bool, int], PoseQp] = {}
 
+    def quick(self, goal: Goal, start: Vector) -> Attempt | None:
+        """The solution close to a start, where undamped steps lead there at once and no fold is near; else None.
+
+        Then the careful steps of :meth:`run` lead there, too, and take longer.
+        """
+        if not self._determined(goal):
+            return None
+        program = self._program(goal, False)
+        program.aim(goal.T_base_ee, None)
+        q, largest = start, CLOSE
+        errors = program.place(q)
+        for _ in range(QUICK):
+            miss = self._measured(goal, q, errors)
+            if miss.size > largest:
+                return None
+            if miss.size <= LAST:
+                q = q if goal.equations else program.read()
+                near = max(map(abs, (q - start).tolist())) <= MAX_STEP
+                return self._last(program, q, miss) if near else None
+            largest = miss.size / 2.0
+            try:
+                errors = program.advance(q, miss.equations)
+            except RuntimeError:
+                return None
+            self.iterations += 1
+            if goal.equations:
+                q = program.read()
+        return None
+
+    def _last(self, program: PoseQp, q: Vector, miss: Miss) -> Attempt | None:
+        """The end of a Newton step from q, where the program's robot is; None near a fold or a limit.
+
+        The smallest singular value is no smaller than one over the Frobenius norm of the inverse; where that is above
+        ``FOLD``, no other solution is close by.
+        """
+        derivative, gap = program.derivative(), program.gap()
+        if miss.equations is not None:
+            derivative = np.concatenate([derivative, miss.equations[0].take(program.free, axis=1)])
+            gap = np.concatenate([gap, miss.equations[1]])
+        *_, inverse, failed = lapack.dgesv(derivative, _eye(len(gap)))  # pyright: ignore[reportAttributeAccessIssue]
+        flat = inverse.T.ravel()
+        if failed or flat @ flat >= FOLD**-2:
+            return None
+        end = q.copy()
+        end[program.free] += inverse @ gap
+        return Attempt(end, miss, True, clear=True) if self.arm.within_limits(end).tolist() == end.tolist() else None
+
     def run(self, goal: Goal, q: Vector, posture: Vector | None = None, limit: int = MAX_ITERATIONS) -> Attempt:
         """Run QP steps from q until the goal is met well within tolerance, or nothing moves any more."""
         program = self._program(goal, posture is not None)
         program.aim(goal.T_base_ee, posture)
         moving, iters, caution, slow = True, 0, 1.0, 0
-        by_newton = posture is None and self._determined(goal)
-        miss = self._miss(program, goal, q)
+        miss = self._measured(goal, q, program.place(q))
         while moving and iters < limit and (posture is not None or miss.size > POLISH):
-            if by_newton and iters and miss.size <= CLOSE:
-                found = self._newton(program, goal, q, miss)
-                if found is not None:
-                    self.iterations += iters
-                    return found
-                by_newton = False
-                program.place(q)
             try:
                 damping = caution * DAMPING_GROWTH * miss.size**2 if self._damped else 0.0
                 moved = program.step(q, damping, miss.equations)
@@ -122,7 +160,7 @@ class LocalSearch:
                 moving = False
                 break
             iters += 1
-            missed = self._miss(program, goal, moved)
+            missed = self._measured(goal, moved, program.place(moved))
             slow = slow + 1 if missed.size > max(SLOW * miss.size, POSITION_TOLERANCE) else 0
             moving = max(map(abs, (moved - q).tolist())) >= STALL and (posture is not None or slow < PATIENCE)
             if self._damped and posture is None and missed.size > miss.size:
@@ -133,41 +171,9 @@ class LocalSearch:
         self.iterations += iters
         return Attempt(q, miss, moving)
 
-    def _newton(self, program: PoseQp, goal: Goal, q: Vector, miss: Miss) -> Attempt | None:
-        """The solution that Newton's steps from close by lead to; None near a fold, or if a limit is in the way.
-
-        The QP's steps are the same there, and take longer. All use the derivative at q, where the program's robot is
-        placed. Its smallest singular value is no smaller than one over the Frobenius norm of the inverse; where that
-        is above ``FOLD``, with a margin for the way to go, no other solution is close by.
-        """
-        derivative = program.derivative()
-        if miss.equations is not None:
-            derivative = np.concatenate([derivative, miss.equations[0].take(program.free, axis=1)])
-        *_, inverse, failed = lapack.dgesv(  # pyright: ignore[reportAttributeAccessIssue]
-            derivative, _eye(len(derivative))
-        )
-        if failed:
-            return None
-        flat = inverse.T.ravel()
-        margin = 1.0 / math.sqrt(flat @ flat) - FOLD
-        for _ in range(NEWTON):
-            gap = program.gap()
-            step = inverse @ (gap if miss.equations is None else np.concatenate([gap, miss.equations[1]]))
-            moved = q.copy()
-            moved[program.free] += step
-            if 2.0 * math.sqrt(step @ step) > margin or self.arm.within_limits(moved).tolist() != moved.tolist():
-                return None
-            if miss.size <= LAST:
-                return Attempt(moved, miss, True, clear=True)
-            missed = self._miss(program, goal, moved)
-            if missed.size > QUICK * miss.size:
-                return None
-            q, miss = moved, missed
-        return None
-
-    def _miss(self, program: PoseQp, goal: Goal, q: Vector) -> Miss:
-        """The errors at q, where the program's robot is placed."""
-        pos_err, rot_err = program.place(q)
+    def _measured(self, goal: Goal, q: Vector, errors: tuple[float, float]) -> Miss:
+        """What joint angles q miss, given the position's and the rotation's errors there."""
+        pos_err, rot_err = errors
         if goal.redundancy is None or not goal.equations:
             return Miss(pos_err, rot_err, math.hypot(pos_err, rot_err))
         at = goal.redundancy.linearise(q)
@@ -182,7 +188,7 @@ class LocalSearch:
         Starts lie along the direction in which the goal is least sensitive: where a goal close to
         the seed was missed, or met only far away, a fold or the elbow's axis lay in between.
         """
-        if not self._determined(goal) or self._miss(self._program(goal, False), goal, seed).size > NEAR:
+        if not self._determined(goal) or self._measured(goal, seed, self._program(goal, False).place(seed)).size > NEAR:
             return None
         v = self._embedded(goal, np.linalg.svd(self.derivative(goal, seed))[2][-1])
         starts = (self.arm.within_limits(seed + share * v) for share in ASIDE)

@@ -114,7 +114,9 @@ class Kinematics(ForwardKinematics):
         before = self._search.iterations
         if posture is not None:
             start = self._search.run(goal, start, self._checked(posture)).q
-        found = self._search.run(goal, start)
+        found = self._search.quick(goal, start) if posture is None else None
+        if found is None:
+            found = self._search.run(goal, start)
         if posture is None:
             found = self._search.across_fold(goal, found, start) or found
             if not found.reached or max(map(abs, (found.q - start).tolist())) > FAR:
