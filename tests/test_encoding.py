@@ -1,5 +1,6 @@
 import hashlib
 import json
+import shutil
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -10,7 +11,7 @@ from er_il.arms.arm import Arm
 from er_il.datasets.dataset import Dataset
 from er_il.datasets.encoding import encode_dataset
 from er_il.datasets.normalisation import bound_rotation_deviation
-from er_il.datasets.schema import LEADER_JOINTS, action_feature
+from er_il.datasets.schema import LEADER_JOINTS, SOURCE_ACTION, action_feature
 from er_il.spaces.layout import Layout
 from er_il.spaces.registry import make_arm_space
 from er_il.spaces.spec import ACTION
@@ -29,15 +30,15 @@ def _episodes():
         yield np.column_stack([q, np.linspace(1, 0, length)]).astype(np.float32)
 
 
-def _write(root, kind, leader=False):
+def _write(root, kind, leader=False, dtype="float32"):
     """Write the episodes with LeRobot itself, actions in the space ``kind``."""
     layout = _layout(kind)
-    columns = {ACTION: action_feature(layout), "observation.state": _state()}
+    columns = {ACTION: action_feature(layout) | {"dtype": dtype}, "observation.state": _state()}
     if leader:
         columns[LEADER_JOINTS] = action_feature(_layout("joint")) | {"info": None}
     dataset = LeRobotDataset.create("er_il/test", 20, columns, root=root, video_backend="pyav")
     for joints in _episodes():
-        actions = layout.encode(joints).astype(np.float32)
+        actions = layout.encode(joints).astype(dtype)
         for t, row in enumerate(joints):
             frame = {ACTION: actions[t], "observation.state": np.float32([t, 2 * t]), "task": "turn"}
             dataset.add_frame(frame | ({LEADER_JOINTS: row} if leader else {}))
@@ -89,6 +90,34 @@ def test_the_recorded_joints_survive_any_chain_of_encodings(tmp_path):
     encode_dataset(Dataset(first), tmp_path / "task", _layout("task"))  # drops the elbow
     encode_dataset(Dataset(tmp_path / "task"), tmp_path / "back", _layout("joint"))
     _assert_same_data(tmp_path / "back", first)
+
+
+def test_kept_actions_are_the_sources_own_in_type_and_statistics(tmp_path):
+    source, target = _write(tmp_path / "source", "joint", dtype="float64"), tmp_path / "erj"
+    encode_dataset(Dataset(source), target, _layout("erj"), keep=True)
+    loaded = LeRobotDataset("er_il/test", root=target, video_backend="pyav")
+    kept, original = loaded.features[SOURCE_ACTION], Dataset(source).features[ACTION]
+    assert (kept["dtype"], kept["shape"]) == ("float64", original["shape"])
+    assert np.array_equal(Dataset(target).column(SOURCE_ACTION), Dataset(source).column(ACTION))
+    ours, theirs = (json.loads((root / "meta/stats.json").read_text()) for root in (target, source))
+    assert ours[SOURCE_ACTION] == theirs[ACTION]
+    ours, theirs = (pq.read_table(root / "meta/episodes") for root in (target, source))
+    for statistic in loaded.meta.stats[SOURCE_ACTION]:
+        copied = ours.column(f"stats/{SOURCE_ACTION}/{statistic}")
+        assert copied.equals(theirs.column(f"stats/{ACTION}/{statistic}"))
+
+
+def test_a_source_without_statistics_gets_those_of_the_encoded_actions(joint, tmp_path):
+    source = shutil.copytree(joint, tmp_path / "source")
+    (source / "meta/stats.json").unlink()
+    episodes = source / "meta/episodes/chunk-000/file-000.parquet"
+    table = pq.read_table(episodes)
+    pq.write_table(table.select([name for name in table.column_names if not name.startswith("stats/")]), episodes)
+    encode_dataset(Dataset(source), tmp_path / "erj", _layout("erj"), keep=True)
+    loaded = LeRobotDataset("er_il/test", root=tmp_path / "erj", video_backend="pyav")
+    assert list(loaded.meta.stats) == [ACTION]
+    assert loaded.meta.stats[ACTION]["count"] == sum(LENGTHS)
+    assert SOURCE_ACTION in loaded.features
 
 
 def test_quaternions_are_continuous_within_and_start_afresh_in_each_episode(joint, tmp_path):

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.dataset as pads
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
@@ -120,8 +119,8 @@ class Dataset:
 
     def rows(self, table: str, columns: Sequence[str], episode: int) -> list[dict[str, Any]]:
         """Read columns of :data:`DATA` or :data:`EPISODES`, in the rows of an episode."""
-        rows = pads.dataset(self.root / table, format="parquet")
-        return rows.to_table(columns=list(columns), filter=pads.field(EPISODE) == episode).to_pylist()
+        filters = [(EPISODE, "==", episode)]
+        return pq.read_table(self.root / table, columns=list(columns), filters=filters).to_pylist()
 
     @property
     def data_files(self) -> list[Path]:
@@ -177,13 +176,15 @@ def read_metadata(root: Path, name: Path, kind: str) -> dict[str, Any]:
 
 
 def read_table(path: Path, *columns: str) -> pa.Table:
-    """Read columns of a parquet file, all by default.
+    """Read columns of a parquet file, all by default; those that it lacks are left out.
 
     Raises:
-        DatasetError: the file is incomplete, as LeRobot leaves it when a recording is killed, or lacks a column.
+        DatasetError: the file is incomplete, as LeRobot leaves it when a recording is killed.
     """
     try:
-        return pq.read_table(path, columns=list(columns) or None)
+        # With a row group an episode, several times as fast as pq.read_table, which reads folders of files too.
+        with pq.ParquetFile(path) as file:
+            return file.read(columns=list(columns) or None)
     except pa.ArrowInvalid as error:
         raise DatasetError(f"{path} is damaged, as by a recording that was killed: {error}") from error
 

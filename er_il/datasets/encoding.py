@@ -8,7 +8,7 @@ import numpy as np
 from er_il.datasets.dataset import Dataset, Floats
 from er_il.datasets.decoding import DecodedEpisode, decode_episodes, read_encoded_episodes
 from er_il.datasets.normalisation import bound_rotation_deviation
-from er_il.datasets.rewriting import Advance, Column, rewrite
+from er_il.datasets.rewriting import Advance, Column, Copy, rewrite
 from er_il.datasets.schema import LEADER_JOINTS, SOURCE_ACTION, Feature, action_feature
 from er_il.spaces.joint import JOINT
 from er_il.spaces.layout import Layout
@@ -57,10 +57,10 @@ def encode_dataset(
     vectors = source.vectors(column)
     layout = layout.fitted(vectors) if fit else layout
     with atomic_folder(target) as partial:
-        columns = {ACTION: _encoded(source, layout, vectors)}
+        copies = {}
         if keep and column == ACTION and layout.kind != JOINT:
-            columns[SOURCE_ACTION] = Column(_kept(source.features[ACTION], layout), vectors)
-        rewrite(source, partial, columns, advance)
+            copies[SOURCE_ACTION] = Copy(_kept(source.features[ACTION], layout), ACTION)
+        rewrite(source, partial, {ACTION: _encoded(source, layout, vectors)}, copies, advance)
         bound_rotation_deviation(partial)
         finish(partial)
 
@@ -89,7 +89,7 @@ def decode_dataset(
     with atomic_folder(target) as partial:
         decoded = decode_episodes(encoded_by, read_encoded_episodes(source, encoded_by), cores(), advance)
         vectors = np.concatenate([episode.vectors for episode in decoded]).astype(np.float32)
-        rewrite(source, partial, {ACTION: _encoded(source, layout.fitted(vectors), vectors)})
+        rewrite(source, partial, {ACTION: _encoded(source, layout.fitted(vectors), vectors)}, {})
         bound_rotation_deviation(partial)
         finish(partial)
     return decoded
@@ -97,12 +97,12 @@ def decode_dataset(
 
 def _encoded(source: Dataset, layout: Layout, vectors: Floats) -> Column:
     """Encode joint vectors, an episode at a time so that rotations stay continuous within it."""
-    episodes = [layout.encode(vectors[rows]) for rows in source.episodes.values()]
+    episodes = [layout.encode(vectors[rows]).astype(np.float32) for rows in source.episodes.values()]
     recorded = source.features[ACTION]
     feature = recorded | action_feature(layout)
     feature["info"] = (recorded.get("info") or {}) | feature["info"]
-    return Column(feature, np.concatenate(episodes).astype(np.float32))
+    return Column(feature, np.concatenate(episodes))
 
 
 def _kept(recorded: Feature, layout: Layout) -> Feature:
-    return recorded | {"dtype": "float32", "names": list(layout.names), "info": None}
+    return recorded | {"names": list(layout.names), "info": None}

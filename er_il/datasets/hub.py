@@ -2,8 +2,6 @@
 
 from pathlib import Path
 
-import httpx
-
 from er_il.support.errors import DatasetError
 
 
@@ -19,7 +17,8 @@ def find_dataset(source: str) -> Path:
     folder = Path(source)
     if folder.exists() or folder.is_absolute() or source.count("/") != 1:
         return folder  # whoever reads it says what is wrong with it
-    from lerobot.datasets import LeRobotDataset  # seconds of imports that a folder does without
+    import httpx  # seconds of imports that a folder does without
+    from lerobot.datasets import LeRobotDataset
 
     try:
         return Path(LeRobotDataset(source, video_backend="pyav").root)

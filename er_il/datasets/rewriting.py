@@ -42,10 +42,19 @@ class Column:
     values: Floats  # (N, dim), a row a frame, in the order of the data's files
 
 
+@dataclass(frozen=True)
+class Copy:
+    """A column of the source under another name, with its values and statistics there."""
+
+    feature: Feature
+    of: str
+
+
 def rewrite(
     source: Dataset,
     target: Path,
     columns: Mapping[str, Column],
+    copies: Mapping[str, Copy],
     advance: Advance = lambda frames: None,
 ) -> None:
     """Write ``source`` as ``target`` with columns replaced or added.
@@ -57,10 +66,11 @@ def rewrite(
         source: The dataset.
         target: Folder that does not exist.
         columns: Columns of the target that the source lacks or has otherwise.
+        copies: Columns of the target that the source has under other names.
         advance: Told about progress.
     """
     info = load_info(source.root)
-    info.features |= {name: column.feature for name, column in columns.items()}
+    info.features |= {name: each.feature for name, each in [*columns.items(), *copies.items()]}
     _copy(source.root, target)
     schema = get_hf_features_from_features(info.features).arrow_schema
     stats: dict[int, Stats] = {}
@@ -74,24 +84,34 @@ def rewrite(
             episode: dict[str, list[str] | NDArray[Any]] = {name: array[frames] for name, array in values.items()}
             stats[table.column(EPISODE)[frames.start].as_py()] = compute_episode_stats(episode, info.features)
             advance(frames.stop - frames.start)
-        write_table_one_row_group_per_episode(_with_columns(table, values, schema), _new(target, source.root, path))
+        table = _with_columns(_with_copies(table, copies, schema), values, schema)
+        write_table_one_row_group_per_episode(table, _new(target, source.root, path))
     for path in parquet_files(source.root / EPISODES):
-        pq.write_table(_with_stats(read_table(path), stats), _new(target, source.root, path))
+        episodes = _with_stats(_with_copied_stats(read_table(path), copies), stats)
+        pq.write_table(episodes, _new(target, source.root, path))
     # LeRobot adds one episode after the other; the same order gives the same digits.
     total: Stats = functools.reduce(
         lambda sofar, each: aggregate_stats([sofar, each]), (stats[episode] for episode in sorted(stats))
     )
-    write_stats((load_stats(source.root) or {}) | total, target)
+    before = load_stats(source.root) or {}
+    copied = {name: before[copy.of] for name, copy in copies.items() if copy.of in before}
+    write_stats(before | copied | total, target)
     write_info(info, target)
 
 
 def _with_columns(table: pa.Table, values: Mapping[str, Floats], schema: pa.Schema) -> pa.Table:
     for name, rows in values.items():
         field = schema.field(name)
-        array = pa.FixedSizeListArray.from_arrays(pa.array(rows.ravel()), rows.shape[1]).cast(field.type)
-        index = table.schema.get_field_index(name)
-        table = table.append_column(field, array) if index < 0 else table.set_column(index, field, array)
+        array = pa.FixedSizeListArray.from_arrays(pa.array(rows.ravel()), rows.shape[1])
+        table = _with_column(table, field, array.cast(field.type))
     return table.replace_schema_metadata(schema.metadata)
+
+
+def _with_copies(table: pa.Table, copies: Mapping[str, Copy], schema: pa.Schema) -> pa.Table:
+    for name, copy in copies.items():
+        field = schema.field(name)
+        table = _with_column(table, field, table.column(copy.of).cast(field.type))
+    return table
 
 
 def _with_stats(episodes: pa.Table, stats: Mapping[int, Stats]) -> pa.Table:
@@ -99,14 +119,24 @@ def _with_stats(episodes: pa.Table, stats: Mapping[int, Stats]) -> pa.Table:
     rows = [stats[episode] for episode in episodes.column(EPISODE).to_pylist()]
     for feature in rows[0]:
         for statistic in rows[0][feature]:
-            column = f"stats/{feature}/{statistic}"
             values = pa.array([row[feature][statistic].tolist() for row in rows])
-            index = episodes.schema.get_field_index(column)
-            if index < 0:
-                episodes = episodes.append_column(column, values)
-            else:
-                episodes = episodes.set_column(index, column, values)
+            episodes = _with_column(episodes, f"stats/{feature}/{statistic}", values)
     return episodes
+
+
+def _with_copied_stats(episodes: pa.Table, copies: Mapping[str, Copy]) -> pa.Table:
+    for name, copy in copies.items():
+        prefix = f"stats/{copy.of}/"
+        for column in [each for each in episodes.column_names if each.startswith(prefix)]:
+            statistic = column.removeprefix(prefix)
+            episodes = _with_column(episodes, f"stats/{name}/{statistic}", episodes.column(column))
+    return episodes
+
+
+def _with_column(table: pa.Table, field: pa.Field | str, values: pa.Array | pa.ChunkedArray) -> pa.Table:
+    """Replace a column of a table, or add it."""
+    index = table.schema.get_field_index(field if isinstance(field, str) else field.name)
+    return table.append_column(field, values) if index < 0 else table.set_column(index, field, values)
 
 
 def _copy(source: Path, target: Path) -> None:

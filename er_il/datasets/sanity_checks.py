@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from er_il.arms.arm import Arm
 from er_il.arms.presets import PRESETS
@@ -154,6 +153,8 @@ def _best_order(sample: JointSample, q: Array) -> list[int] | None:
     excess = np.maximum(arm.lower - q[:, :, None], q[:, :, None] - arm.upper)  # (N, value, joint)
     outside = (excess > LIMIT_TOLERANCE).mean(axis=0)
     if sample.positions is None or math.factorial(n) > MAX_ORDERS:
+        from scipy.optimize import linear_sum_assignment  # half a second of imports, which plausible values do without
+
         # As few joints as possible elsewhere; among those, near the middle of their ranges.
         middle = np.abs(q.mean(axis=0)[:, None] - (arm.lower + arm.upper) / 2) / (arm.upper - arm.lower)
         order = linear_sum_assignment((outside + 1e-2 * (1 - np.eye(n)) + 1e-4 * middle).T)[1].tolist()

@@ -3,7 +3,6 @@
 from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,35 +12,12 @@ from lerobot.envs.utils import NEW_ROLLOUT_OPTION
 from er_il.control.commander import BEST_EFFORT
 from er_il.envs.contract import check_policy
 from er_il.evaluation.elbow import ElbowReference
-from er_il.kinematics.solver import Status
+from er_il.evaluation.results import Rollout
 from er_il.policy.actor import POLICY_ROWS, Actor, environment_of, one_thread
 from er_il.support.errors import ErIlError
 
 FIRST_SEED = 1000  # LeRobot's own; demonstrations use seeds from a million up
 TIMEOUT = "timeout"
-
-
-@dataclass(frozen=True)
-class Rollout:
-    """One rollout."""
-
-    seed: int
-    success: bool
-    failure: str  # "" after success
-    statuses: Counter[str]  # of decoding, one a step
-    latencies: tuple[float, ...]  # [s] of decoding, one a step
-    joint_step: float  # [rad] largest joint change that a decoded action asked for
-    elbow_error: float | None = None  # [m] see :class:`er_il.evaluation.elbow.ElbowReference`; None: not measured
-
-    @property
-    def steps(self) -> int:
-        """Number of control steps."""
-        return len(self.latencies)
-
-    @property
-    def invalid(self) -> int:
-        """Number of actions whose status was not OK."""
-        return self.steps - self.statuses[Status.OK]
 
 
 def evaluate(

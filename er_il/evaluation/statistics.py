@@ -3,8 +3,6 @@
 import math
 from collections.abc import Sequence
 
-from scipy.stats import binomtest, norm
-
 from er_il.support.errors import ErIlError
 
 LEVEL = 0.95
@@ -18,6 +16,8 @@ def exact_interval(successes: int, episodes: int, level: float = LEVEL) -> tuple
     """
     if not 0 <= successes <= episodes or episodes < 1:
         raise ErIlError(f"{successes} successes in {episodes} episodes have no rate.")
+    from scipy.stats import binomtest  # a second of imports, which reports without rates do without
+
     interval = binomtest(successes, episodes).proportion_ci(confidence_level=level, method="exact")
     return float(interval.low), float(interval.high)
 
@@ -45,6 +45,8 @@ def paired_difference(a: Sequence[bool], b: Sequence[bool], level: float = LEVEL
     a_only = sum(1 for x, y in zip(a, b, strict=True) if x and not y)
     b_only = sum(1 for x, y in zip(a, b, strict=True) if y and not x)
     p_a, p_b = (a_only + 1) / (n + 2), (b_only + 1) / (n + 2)
+    from scipy.stats import norm
+
     half = float(norm.ppf(0.5 + level / 2)) * math.sqrt((p_a + p_b - (p_a - p_b) ** 2) / (n + 2))
     centre = p_a - p_b
     return (a_only - b_only) / n, max(-1.0, centre - half), min(1.0, centre + half)
