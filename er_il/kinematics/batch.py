@@ -144,13 +144,18 @@ class BatchSearch:
     def _last(self, error: Any, derivative: Any) -> tuple[Any, Any]:
         """The step (free joints, N) that ends the search, and a mask (N,) of those far from a singularity.
 
-        The smallest singular value is no smaller than one over the Frobenius norm of the inverse, which costs less.
+        The smallest singular value is no smaller than one over the Frobenius norm of the inverse, which costs less
+        and settles most.
         """
         xp = array_api.array_namespace(error)
         square, Jt = _square(derivative, constant(np.full(error.shape[1], LEAST), error), xp)
         inverse = xp.linalg.inv(square)
         step = xp.matmul(Jt, xp.matmul(inverse, xp.permute_dims(error, (1, 0))[..., None]))[..., 0]
-        return xp.permute_dims(step, (1, 0)), xp.linalg.trace(inverse) < FOLD**-2
+        clear = xp.linalg.trace(inverse) < FOLD**-2
+        doubtful = xp.nonzero(~clear)[0]
+        J = xp.permute_dims(derivative[:, :, doubtful], (2, 0, 1))
+        clear[doubtful] = xp.linalg.svdvals(J)[:, -1] > FOLD
+        return xp.permute_dims(step, (1, 0)), clear
 
     def _inside(self, q: Any) -> Any:
         """Mask (N,) of the joint angles (N, n) [rad] within the limits."""

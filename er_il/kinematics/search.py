@@ -131,8 +131,8 @@ class LocalSearch:
     def _last(self, program: PoseQp, q: Vector, miss: Miss) -> Attempt | None:
         """The end of a Newton step from q, where the program's robot is; None near a fold or a limit.
 
-        The smallest singular value is no smaller than one over the Frobenius norm of the inverse; where that is above
-        ``FOLD``, no other solution is close by.
+        Where the smallest singular value is above ``FOLD``, no other solution is close by. It is no smaller than one
+        over the Frobenius norm of the inverse, which costs less and settles most.
         """
         derivative, gap = program.derivative(), program.gap()
         if miss.equations is not None:
@@ -140,7 +140,7 @@ class LocalSearch:
             gap = np.concatenate([gap, miss.equations[1]])
         *_, inverse, failed = lapack.dgesv(derivative, _eye(len(gap)))  # pyright: ignore[reportAttributeAccessIssue]
         flat = inverse.T.ravel()
-        if failed or flat @ flat >= FOLD**-2:
+        if failed or (flat @ flat >= FOLD**-2 and np.linalg.svd(derivative, compute_uv=False)[-1] <= FOLD):
             return None
         end = q.copy()
         end[program.free] += inverse @ gap
