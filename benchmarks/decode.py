@@ -11,7 +11,7 @@ Without the dependency group ``peers``, what needs it is left out.
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -23,7 +23,7 @@ from scipy.spatial.transform import Rotation
 from solvers import POSITION_TOLERANCE, ROTATION_TOLERANCE, Solution, Solver, Target, is_met, own_solvers
 from threadpoolctl import threadpool_limits
 
-from er_il import Arm, make_action_space
+from er_il import Arm, Status, make_action_space
 from er_il.arms.arm import Vector
 from er_il.report.decode_page import write_page
 from er_il.spaces.round_trip import EXACT, SINGULAR
@@ -35,6 +35,9 @@ NEAR, FAR = 0.03, 0.3  # [rad] how far each joint of a seed may be from the targ
 AT_LIMIT = 1e-6  # [rad] from a limit: a joint there is at it, whatever the rounding of angles
 SLACK = 1e-6  # [rad] by which a solution may pass a limit: programs keep limits to a tolerance of their own
 BLOCK = 20  # targets of a turn
+BATCHES = (1, 5, 10, 20, 50, 100, 1000)  # actions decoded together
+SINGLES = 1000  # of them at most are decoded one by one, too
+REPETITIONS = 9  # of which the quickest counts
 
 Draw = Callable[[np.random.Generator], Vector]  # joint angles (n,) [rad] of a target
 
@@ -125,8 +128,38 @@ def _percentiles(name: str, numbers: ArrayLike) -> dict[str, float]:
     return {name.format(f"p{share}"): float(np.percentile(np.asarray(numbers), share)) for share in (50, 99)}
 
 
-def main(targets: int = 1000, rng_seed: int = 0, out: Path = Path("results/decode")) -> None:
-    """Measure all solvers in all scenarios; write the report and its page."""
+def measure_batches(arm: Arm, largest: int, rng: np.random.Generator) -> list[dict[str, Any]]:
+    """Time of a batch of actions beside that of the same actions one by one, by space and number of actions.
+
+    Configurations lie around the arm's home posture, seeds within ``NEAR`` of each joint.
+    """
+    rows = []
+    for kind in ("task", "erj", "era"):
+        space = make_action_space(kind, arm).arm_space
+        for count in (*BATCHES, largest):
+            q = arm.within_limits(arm.home + rng.uniform(-FAR, FAR, (count, arm.dof)))
+            actions, seeds = space.encode(q), arm.within_limits(q + rng.uniform(-NEAR, NEAR, q.shape))
+            few = [*zip(actions[:SINGLES], seeds[:SINGLES], strict=True)]
+            together, apart = [], []
+            for _ in range(REPETITIONS if count < largest else 1):
+                started = time.thread_time()
+                decoded = space.decode_batch(actions, seeds)
+                between = time.thread_time()
+                single = [space.decode(*each) for each in few]
+                together.append((between - started) / count)
+                apart.append((time.thread_time() - between) / len(few))
+            both = (decoded.status[: len(few)] == Status.OK) & [each.status is Status.OK for each in single]
+            apart_by = np.abs(decoded.q[: len(few)] - [each.q for each in single]).max(axis=1)[both].max()
+            numbers = {"batch_ms": 1e3 * min(together), "single_ms": 1e3 * min(apart)}
+            agreement = {"solved": int((decoded.status == Status.OK).sum()), "largest_difference_rad": float(apart_by)}
+            rows.append({"space": kind, "actions": count} | numbers | agreement)
+    return rows
+
+
+def main(
+    targets: int = 1000, rng_seed: int = 0, largest_batch: int = 1_000_000, out: Path = Path("results/decode")
+) -> None:
+    """Measure all solvers in all scenarios, and batches; write the report and its page."""
     arm = Arm.preset(ARM)
     solvers = [*own_solvers(arm), *peers(arm)]
     rows = []
@@ -144,7 +177,8 @@ def main(targets: int = 1000, rng_seed: int = 0, out: Path = Path("results/decod
     meta["versions"] |= versions()
     meta |= {"arm": ARM, "rng_seed": rng_seed, "exact": EXACT, "ill_conditioned": SINGULAR}
     meta |= {"position_tolerance_m": POSITION_TOLERANCE, "rotation_tolerance_rad": ROTATION_TOLERANCE}
-    write_json(out / "report.json", {"meta": meta, "decodes": rows})
+    batches = measure_batches(arm, largest_batch, np.random.default_rng(rng_seed))
+    write_json(out / "report.json", {"meta": meta, "decodes": rows, "batches": batches})
     write_page(out)
 
 

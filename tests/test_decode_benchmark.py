@@ -18,7 +18,7 @@ def measure(out: Path) -> dict[str, Any]:
     """Run the documented command; return its report."""
     script, *options = documented("docs/speed.md", "python benchmarks/decode.py")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "argv", [script, *options, "--targets", "12", "--out", str(out)])
+        patch.setattr(sys, "argv", [script, *options, "--targets", "12", "--largest-batch", "3000", "--out", str(out)])
         runpy.run_path(str(ROOT / script), run_name="__main__")
     return json.loads((out / "report.json").read_text())
 
@@ -65,12 +65,17 @@ def test_a_pose_alone_is_met_by_other_joints(measured: dict[str, Any]) -> None:
 
 
 def test_other_libraries_solve_for_a_commanded_joint(tmp_path: Path) -> None:
-    pytest.importorskip("mink", reason="the dependency group peers is not installed")
     report = measure(tmp_path)
     for solver, joint in (("mink", "panda_joint1"), ("pink", "panda_joint1"), ("GeoFIK", "panda_joint7")):
         near = rows(report, solver, joint)["Seed ± 0.03 rad"]
         assert near["solved"] == 12
         assert near["joint_error_p99_rad"] < 0.03
+
+
+def test_batches_are_the_single_decodes(measured: dict[str, Any]) -> None:
+    assert {row["space"] for row in measured["batches"]} == {"task", "erj", "era"}
+    assert all(row["largest_difference_rad"] < 1e-6 for row in measured["batches"])
+    assert all(row["solved"] == row["actions"] for row in measured["batches"])
 
 
 def test_the_page_is_rendered_from_the_report(tmp_path: Path) -> None:
