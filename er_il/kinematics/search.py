@@ -28,7 +28,7 @@ ROTATION_TOLERANCE = 1e-3  # [rad]
 MAX_ITERATIONS = 50
 DAMPING_GROWTH = 1e-2  # [1] damping per squared miss in m and rad
 CAUTION = 10.0  # damping grows by this factor after a step that overshot, and shrinks after one that did not
-CLOSE = 0.2  # [m and rad] goals so close to the seed are tried by quick steps:
+CLOSE = 0.08  # [m and rad] goals so close to the seed are tried by quick steps:
 QUICK = 5  # at most so many looks at what is left, each at most half of the one before,
 LAST = 3e-6  # [m and rad] from here by a last step, whose end is not looked at
 POLISH = 1e-8  # [m and rad] solve this far: the last steps are quadratic, and near a fold joints need it
@@ -129,22 +129,31 @@ class LocalSearch:
         return None
 
     def _last(self, program: PoseQp, q: Vector, miss: Miss) -> Attempt | None:
-        """The end of a Newton step from q, where the program's robot is; None near a fold or a limit.
+        """The end of a Newton step from q, where the program's robot is; None near a fold or a limit."""
+        inverse = self._inverse(program, miss)
+        if inverse is None:
+            return None
+        gap = program.gap()
+        if miss.equations is not None:
+            gap = np.concatenate([gap, miss.equations[1]])
+        end = q.copy()
+        end[program.free] += inverse @ gap
+        return Attempt(end, miss, True, clear=True) if self.arm.within_limits(end).tolist() == end.tolist() else None
+
+    def _inverse(self, program: PoseQp, miss: Miss) -> Array | None:
+        """Inverse of the derivative where the program's robot is; None near a fold.
 
         Where the smallest singular value is above ``FOLD``, no other solution is close by. It is no smaller than one
         over the Frobenius norm of the inverse, which costs less and settles most.
         """
-        derivative, gap = program.derivative(), program.gap()
+        derivative = program.derivative()
         if miss.equations is not None:
             derivative = np.concatenate([derivative, miss.equations[0].take(program.free, axis=1)])
-            gap = np.concatenate([gap, miss.equations[1]])
-        *_, inverse, failed = lapack.dgesv(derivative, _eye(len(gap)))  # pyright: ignore[reportAttributeAccessIssue]
+        *_, inverse, failed = lapack.dgesv(derivative, _eye(len(derivative)))  # pyright: ignore[reportAttributeAccessIssue]
         flat = inverse.T.ravel()
         if failed or (flat @ flat >= FOLD**-2 and np.linalg.svd(derivative, compute_uv=False)[-1] <= FOLD):
             return None
-        end = q.copy()
-        end[program.free] += inverse @ gap
-        return Attempt(end, miss, True, clear=True) if self.arm.within_limits(end).tolist() == end.tolist() else None
+        return inverse
 
     def run(self, goal: Goal, q: Vector, posture: Vector | None = None, limit: int = MAX_ITERATIONS) -> Attempt:
         """Run QP steps from q until the goal is met well within tolerance, or nothing moves any more."""
