@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.dataset as pads
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
@@ -120,6 +119,8 @@ class Dataset:
 
     def rows(self, table: str, columns: Sequence[str], episode: int) -> list[dict[str, Any]]:
         """Read columns of :data:`DATA` or :data:`EPISODES`, in the rows of an episode."""
+        import pyarrow.dataset as pads  # and with it pandas: half a second that metadata do without
+
         rows = pads.dataset(self.root / table, format="parquet")
         return rows.to_table(columns=list(columns), filter=pads.field(EPISODE) == episode).to_pylist()
 

@@ -9,7 +9,7 @@ from lerobot.envs.utils import NEW_ROLLOUT_OPTION
 from numpy.typing import NDArray
 
 from er_il.envs.contract import check_policy
-from er_il.evaluation.rollouts import TIMEOUT
+from er_il.evaluation.rollout import TIMEOUT
 from er_il.evaluation.trace import Trace
 from er_il.policy.actor import Actor, environment_of, one_thread
 from er_il.spaces.action_space import ActionSpace

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from er_il.evaluation.rollouts import Rollout
+from er_il.evaluation.rollout import Rollout
 from er_il.evaluation.statistics import exact_interval, paired_difference
 from er_il.kinematics.solver import Status
 from er_il.support.atomic_files import write_atomically

@@ -3,7 +3,6 @@
 from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -11,37 +10,12 @@ from gymnasium.vector import SyncVectorEnv
 from lerobot.envs.utils import NEW_ROLLOUT_OPTION
 
 from er_il.control.commander import BEST_EFFORT
-from er_il.envs.contract import check_policy
+from er_il.evaluation.checks import check_evaluation
 from er_il.evaluation.elbow import ElbowReference
-from er_il.kinematics.solver import Status
-from er_il.policy.actor import POLICY_ROWS, Actor, environment_of, one_thread
+from er_il.evaluation.rollout import FIRST_SEED, TIMEOUT, Rollout
+from er_il.policy.actor import Actor, environment_of, one_thread
+from er_il.policy.rows import POLICY_ROWS
 from er_il.support.errors import ErIlError
-
-FIRST_SEED = 1000  # LeRobot's own; demonstrations use seeds from a million up
-TIMEOUT = "timeout"
-
-
-@dataclass(frozen=True)
-class Rollout:
-    """One rollout."""
-
-    seed: int
-    success: bool
-    failure: str  # "" after success
-    statuses: Counter[str]  # of decoding, one a step
-    latencies: tuple[float, ...]  # [s] of decoding, one a step
-    joint_step: float  # [rad] largest joint change that a decoded action asked for
-    elbow_error: float | None = None  # [m] see :class:`er_il.evaluation.elbow.ElbowReference`; None: not measured
-
-    @property
-    def steps(self) -> int:
-        """Number of control steps."""
-        return len(self.latencies)
-
-    @property
-    def invalid(self) -> int:
-        """Number of actions whose status was not OK."""
-        return self.steps - self.statuses[Status.OK]
 
 
 def evaluate(
@@ -77,15 +51,13 @@ def evaluate(
         UnknownNameError: no such task or decoder.
         ErIlError: no episodes.
     """
-    if episodes < 1:
-        raise ErIlError(f"{episodes} episodes say nothing; ask for at least one.")
+    check_evaluation(policy, task, decoder_name, episodes, on_invalid)
     if not 1 <= batch_size <= POLICY_ROWS:
         raise ErIlError(f"The batch size is {batch_size}; it must be between 1 and {POLICY_ROWS}.")
     config = environment_of(policy, task, decoder_name, on_invalid, posture)
     vector = config.create_envs(min(batch_size, episodes))[config.type][0]
     assert isinstance(vector, SyncVectorEnv)
     with closing(vector), one_thread():
-        check_policy(policy, vector.get_attr("space")[0])
         actor = Actor.load(policy, config)
         done: list[Rollout] = []
         while len(done) < episodes:
