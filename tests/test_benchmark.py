@@ -20,7 +20,8 @@ from er_il.arms.arm import Arm
 from er_il.cli.benchmark import benchmark
 from er_il.evaluation.elbow import ElbowReference
 from er_il.evaluation.posture_baselines import grasp_posture, mean_posture
-from er_il.evaluation.results import Rollout, long_form, report_cells
+from er_il.evaluation.results import long_form, report_cells
+from er_il.evaluation.rollout import Rollout
 from er_il.experiments.films import telling_seed
 from er_il.experiments.grid import Cell, Grid, GridError
 from er_il.experiments.plan import Plan

@@ -4,6 +4,8 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
+from pathlib import Path
 
 import pytest
 
@@ -23,6 +25,34 @@ ANSWERED = {
     ("eval", "policies/reach_cup/erj"): USER_MISTAKE,
     ("generate", "reach_cup", "--episodes", "many"): USER_MISTAKE,
 }
+# Mistakes that only kinematics, worlds or files tell: without LeRobot and torch, whose import takes seconds.
+TOLD = (
+    ("advise", "nothing_here"),
+    ("attach", "{golden}/policy", "--out", "copy", "--dataset", "nowhere"),
+    ("attach", "{golden}/policy", "--out", "{golden}", "--dataset", "{golden}/push_button_elbow/erj"),
+    ("benchmark", "absent.yaml"),
+    ("circle", "--arm", "pandu"),
+    ("demo", "--decoders", "task"),
+    ("demo", "--out", "{golden}"),
+    ("encode", "nowhere", "--to", "erj", "--out", "new"),
+    ("encode", "{golden}/push_button_elbow/erj", "--to", "polar", "--out", "new"),
+    ("encode", "{golden}/push_button_elbow/erj", "--to", "task", "--out", "{golden}"),
+    ("eval", "nowhere", "--task", "reach_cup", "--decoder", "erj"),
+    ("eval", "{golden}/policy", "--task", "reach_cap", "--decoder", "erj"),
+    ("eval", "{golden}/policy", "--task", "push_button_elbow", "--decoder", "joint"),
+    ("eval", "{golden}/policy", "--task", "push_button_elbow", "--decoder", "erj", "--episodes", "0"),
+    ("generate", "reach_cup", "--spaces", "polar", "--out", "new"),
+    ("generate", "reach_cup", "--cameras", "elbow", "--out", "new"),
+    ("generate", "push_button_elbow", "--seed", "9", "--out", "{golden}/push_button_elbow"),
+    ("replay", "sweep"),
+    ("study", "joints", "nowhere"),
+    ("study", "joints", "--training", "absent.json"),
+    ("train", "reach_cup", "erj", "--dataset", "nowhere"),
+    ("verify", "nowhere"),
+    ("view", "nowhere", "--save", "new.rrd"),
+    ("view", "{golden}/push_button_elbow/erj", "--save", "new.txt"),
+    ("view", "{golden}/push_button_elbow/erj", "--episode", "99", "--save", "new.rrd"),
+)
 ASK = """
 import json, sys
 from er_il.cli import main
@@ -37,15 +67,31 @@ print(json.dumps([codes, sorted({name.partition(".")[0] for name in sys.modules}
 """
 
 
-def test_help_and_mistakes_are_answered_before_anything_heavy_is_loaded() -> None:
+def ask(commands: Sequence[Sequence[str]]) -> tuple[subprocess.CompletedProcess[str], list[int], set[str]]:
+    """Run commands in one process; return what it printed, their exit codes and the packages that it loaded."""
     asked = subprocess.run(
-        [sys.executable, "-c", ASK, json.dumps(list(ANSWERED))], capture_output=True, text=True, check=True
+        [sys.executable, "-c", ASK, json.dumps(commands)], capture_output=True, text=True, check=True
     )
     codes, loaded = json.loads(asked.stdout.splitlines()[-1])
+    return asked, codes, set(loaded)
+
+
+def test_help_and_mistakes_are_answered_before_anything_heavy_is_loaded() -> None:
+    asked, codes, loaded = ask(list(ANSWERED))
     assert dict(zip(ANSWERED, codes, strict=True)) == ANSWERED
-    assert HEAVY.isdisjoint(loaded), HEAVY & set(loaded)
+    assert HEAVY.isdisjoint(loaded), HEAVY & loaded
     for command in cli.COMMANDS:
         assert command in asked.stdout
+
+
+def test_mistakes_are_told_before_lerobot_is_loaded(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.chdir(tmp_path)
+    golden = Path(__file__).parent / "golden"
+    asked, codes, loaded = ask([[argument.format(golden=golden) for argument in command] for command in TOLD])
+    assert dict(zip(TOLD, codes, strict=True)) == dict.fromkeys(TOLD, USER_MISTAKE), asked.stderr
+    assert asked.stderr.count("error: ") == len(TOLD)
+    assert loaded.isdisjoint({"lerobot", "torch"})
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_an_interruption_while_a_command_is_loaded_is_one_line(

@@ -15,7 +15,8 @@ from lerobot.policies.act.modeling_act import ACTPolicy
 from er_il import Arm, make_action_space
 from er_il.envs.contract import Contract
 from er_il.evaluation.recording import record_rollout
-from er_il.evaluation.results import Rollout, as_csv, load_notes, load_rollouts, long_form, save_rollouts, summarise
+from er_il.evaluation.results import as_csv, load_notes, load_rollouts, long_form, save_rollouts, summarise
+from er_il.evaluation.rollout import Rollout
 from er_il.evaluation.rollouts import evaluate
 from er_il.support.counts import tally
 from er_il.support.errors import ErIlError, PolicyError, UnknownNameError

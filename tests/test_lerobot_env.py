@@ -50,6 +50,17 @@ def test_wrong_options_name_the_right_ones(options: dict[str, str], choices: str
         ErIlEnvConfig(**options)  # pyright: ignore[reportArgumentType]
 
 
+def test_films_have_the_size_that_was_asked_for():
+    sizes = [{}, {"visualization_width": 64, "visualization_height": 48}]
+    shapes = []
+    for size in sizes:
+        env = ErIlEnvConfig(**size).make()
+        env.reset(seed=0)
+        shapes.append(np.asarray(env.render()).shape)
+        env.close()
+    assert shapes == [(240, 320, 3), (48, 64, 3)]
+
+
 def test_an_episode_that_has_ended_waits_without_leaking_its_successor():
     config = ErIlEnvConfig(action_space="joint", on_invalid="stop")
     vector = make_env(config, n_envs=2)["er_il"][0]

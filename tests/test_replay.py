@@ -6,13 +6,14 @@ import pytest
 from rich.progress import Progress
 
 from er_il.datasets.dataset import Dataset
+from er_il.datasets.hub import find_datasets
 from er_il.datasets.recipe import Recipe
 from er_il.datasets.record import DatasetRecord, read_episodes
 from er_il.datasets.recording import generate
 from er_il.envs.decoders import decoder
 from er_il.envs.tasks import task_id
 from er_il.envs.wrapper import make_action_space_env
-from er_il.evaluation.replay import find_datasets, replay, replay_demo, write_report
+from er_il.evaluation.replay import replay, replay_demo, write_report
 from er_il.support.errors import DatasetError
 
 _UNSPECIFIED = {"codebase_version": "v3.0", "fps": 20, "total_frames": 1, "features": {"action": {"shape": [1]}}}

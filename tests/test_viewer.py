@@ -32,8 +32,8 @@ from er_il.kinematics.solver import kinematics_of
 from er_il.spaces.spec import ACTION
 from er_il.support.errors import ArmError, ErIlError
 from er_il.support.shapes import POSE_NAMES
-from er_il.viewer import save_recording
 from er_il.viewer.arm import drawable_urdf
+from er_il.viewer.show import save_recording
 from er_il.viewer.source import read_source
 
 TASK, EPISODE, CAMERA = "lift_cup", 1, "wrist"

@@ -36,10 +36,6 @@ def advise(
     from rich.console import Console
 
     from er_il.cli.progress import make_progress
-    from er_il.experiments.studies.joints import study_joints
-    from er_il.report.joints import choices_texts, joints_figure
-    from er_il.report.style import save
-    from er_il.report.tables import joined, terminal_table
     from er_il.spaces.joint_choice import choices
     from er_il.support.atomic_files import write_json
     from er_il.support.provenance import provenance
@@ -49,6 +45,11 @@ def advise(
     found = _arms(source, robot, episodes)
     for arm, _ in found.values():
         choices(arm)  # an arm without redundancy is an error before another one is measured
+    from er_il.experiments.studies.joints import study_joints  # seconds of imports: mistakes are told before
+    from er_il.report.joints import choices_texts, joints_figure
+    from er_il.report.style import save
+    from er_il.report.tables import joined, terminal_table
+
     with make_progress(console) as progress:
         reports = {}
         for label, (arm, demos) in found.items():

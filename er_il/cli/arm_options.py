@@ -47,7 +47,7 @@ class ArmOptions:
         return Wiring(**own, redundant=redundant, angle_frames=angle_frames)
 
     def wirings(self, redundant: tuple[str, ...] = (), angle_frames: tuple[str, ...] = ()) -> "list[Wiring]":
-        """All arms; none if nothing is said. Wrong options are told here, before seconds of imports.
+        """All arms; none if nothing is said.
 
         Raises:
             ErIlError: both an arm and a file of arms are given, or they are wrong.

@@ -28,19 +28,19 @@ def benchmark(
     """
     from rich.console import Console
 
-    from er_il.experiments.grid import Grid
-
-    asked = Grid.from_file(grid)  # seconds of imports follow: mistakes are told before
     from er_il.cli.progress import make_progress
     from er_il.experiments.cluster import RayExecutor
+    from er_il.experiments.grid import Grid
     from er_il.experiments.plan import Plan
-    from er_il.experiments.run import run
     from er_il.support.workers import LocalExecutor, cores
 
-    plan = Plan(asked, (out or Path("outputs/benchmark") / grid.stem).resolve())
+    plan = Plan(Grid.from_file(grid), (out or Path("outputs/benchmark") / grid.stem).resolve())
     folder, console = results or Path("results") / grid.stem, Console()
     workplace = RayExecutor(ray_address) if ray_address else LocalExecutor(cores())
+    plan.check()  # seconds of imports follow: mistakes are told before
     with workplace as executor, make_progress(console) as progress:
+        from er_il.experiments.run import run
+
         outcome = run(plan, executor, progress, folder)
     report(console, outcome, folder)
 

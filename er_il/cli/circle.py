@@ -17,6 +17,8 @@ def circle(*, arm: str = "panda", out: Path = Path("outputs/circle")) -> None:
     from rich.console import Console
 
     from er_il.arms.arm import Arm
+
+    subject = Arm.preset(arm)  # seconds of imports follow: mistakes are told before
     from er_il.experiments.studies.circle import study_circle
     from er_il.report.circle import circle_figure
     from er_il.report.tables import terminal_table
@@ -25,7 +27,7 @@ def circle(*, arm: str = "panda", out: Path = Path("outputs/circle")) -> None:
 
     console = Console()
     with console.status("Solving along the circle"):
-        report = study_circle(Arm.preset(arm))
+        report = study_circle(subject)
     report["meta"] = provenance() | report["meta"]
     texts = table("drift", **report)
     shown = terminal_table(texts.rename(columns=lambda heading: heading.replace("Elbow drift after lap", "Lap")))

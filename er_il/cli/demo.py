@@ -29,17 +29,17 @@ def demo(
     from rich.console import Console
 
     from er_il.cli.benchmark import report
-    from er_il.experiments.grid import demo_grid
-
-    # Seconds of imports follow: mistakes are told before.
-    grid = demo_grid(task, seed, tuple(decoders.split(",")), rollouts, demonstrations, steps)
     from er_il.cli.progress import make_progress
+    from er_il.experiments.grid import demo_grid
     from er_il.experiments.plan import Plan
-    from er_il.experiments.run import run
     from er_il.support.workers import LocalExecutor, cores
 
+    grid = demo_grid(task, seed, tuple(decoders.split(",")), rollouts, demonstrations, steps)
     folder, console = out or Path("outputs") / ("demo" if task == "reach_cup" else task), Console()
     plan = Plan(grid, folder.resolve(), recorders=cores())
+    plan.check()  # seconds of imports follow: mistakes are told before
+    from er_il.experiments.run import run
+
     # All trainings at once, be they more than the cores: in turns, a core would idle beside the last.
     with LocalExecutor(max(cores(), len(grid.spaces))) as executor, make_progress(console) as progress:
         outcome = run(plan, executor, progress, folder, with_films=True)

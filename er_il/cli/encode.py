@@ -36,11 +36,9 @@ def encode(
     from rich.console import Console
 
     from er_il.cli.progress import make_progress
-
-    wirings = robot.wirings(redundant, angle_frames)  # wrong options are told before seconds of imports
-
     from er_il.datasets.reencoding import reencode
 
+    wirings = robot.wirings(redundant, angle_frames)
     console = Console()
     with make_progress(console) as progress:
         bar = progress.add_task(f"Encode as {to}", total=None)

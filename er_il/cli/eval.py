@@ -29,9 +29,13 @@ def eval(
     from rich.console import Console
 
     from er_il.cli.progress import make_progress
+    from er_il.evaluation.checks import check_evaluation
+    from er_il.policy.training import pretrained
+
+    found = pretrained(policy)
+    check_evaluation(found, task, decoder, episodes, on_invalid)  # seconds of imports follow: mistakes are told before
     from er_il.evaluation.results import COUNTS, as_csv, long_form, summarise
     from er_il.evaluation.rollouts import evaluate
-    from er_il.policy.training import pretrained
     from er_il.support.atomic_files import write_atomically, write_json
     from er_il.support.counts import tally
     from er_il.support.provenance import provenance
@@ -40,7 +44,7 @@ def eval(
     with make_progress(console) as progress:
         bar = progress.add_task(f"{task}, {decoder}", total=episodes)
         done = evaluate(
-            pretrained(policy),
+            found,
             task,
             decoder,
             episodes=episodes,

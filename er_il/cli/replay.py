@@ -16,8 +16,7 @@ def replay(datasets: Positional[tuple[str, ...]], *, out: Path = Path("outputs/r
     from rich.table import Table
 
     from er_il.cli.progress import make_progress
-    from er_il.evaluation.replay import find_datasets, write_report
-    from er_il.evaluation.replay import replay as replay_datasets
+    from er_il.datasets.hub import find_datasets
     from er_il.support.counts import tally
     from er_il.support.errors import DatasetError
     from er_il.support.provenance import provenance
@@ -26,6 +25,9 @@ def replay(datasets: Positional[tuple[str, ...]], *, out: Path = Path("outputs/r
     if not datasets:
         raise DatasetError("Name a dataset or a task, such as reach_cup.")
     found = find_datasets(datasets)
+    from er_il.evaluation.replay import replay as replay_datasets
+    from er_il.evaluation.replay import write_report
+
     console = Console()
     with make_progress(console) as progress:
         bars = {}

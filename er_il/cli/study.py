@@ -29,6 +29,12 @@ class StudyOptions:
     out: Path | None = None
     """Folder of report.json, the figure and the recorded demonstrations; outputs/study/<study> if omitted."""
 
+    def check(self) -> None:
+        """Tell mistakes before seconds of imports."""
+        from er_il.experiments.studies.demos import check_demos
+
+        check_demos(self.demos, self.episodes)
+
     def run(
         self,
         name: str,
@@ -63,12 +69,13 @@ def joints(study: OmitArgPrefixes[StudyOptions], *, training: Path | None = None
         study: Demonstrations and results.
         training: Report of policies trained with several joints (decoders erj@<joint>), to compare the advice with.
     """
-    from er_il.experiments.studies.joints import study_joints
     from er_il.experiments.studies.prediction import predict, read_training
+
+    study.check()
+    cells = read_training(training) if training else []
+    from er_il.experiments.studies.joints import study_joints
     from er_il.report.joints import joints_figure, notes
     from er_il.support.workers import cores
-
-    cells = read_training(training) if training else []
 
     def measure(arm: "Arm", demos: "Demos", advance: Callable[[int, int], object]) -> dict[str, Any]:
         report = study_joints(arm, demos, cores(), advance)
@@ -84,13 +91,14 @@ def validity(study: OmitArgPrefixes[StudyOptions], *, samples: int = 150) -> Non
         study: Demonstrations and results.
         samples: Actions of each size, in each space, around each kind of states.
     """
-    from er_il.experiments.studies.validity import study_validity
-    from er_il.report.validity import findings, validity_figure
     from er_il.support.errors import ErIlError
-    from er_il.support.workers import cores
 
     if samples < 1:
         raise ErIlError(f"{samples} samples are too few: at least one is needed.")
+    study.check()
+    from er_il.experiments.studies.validity import study_validity
+    from er_il.report.validity import findings, validity_figure
+    from er_il.support.workers import cores
 
     def measure(arm: "Arm", demos: "Demos", advance: Callable[[int, int], object]) -> dict[str, Any]:
         return study_validity(arm, demos, samples, cores(), advance)
@@ -104,6 +112,7 @@ def deltas(study: OmitArgPrefixes[StudyOptions]) -> None:
     Args:
         study: Demonstrations and results.
     """
+    study.check()
     from er_il.experiments.studies.deltas import study_deltas
     from er_il.report.tables import terminal_table
     from er_il.report.text import table

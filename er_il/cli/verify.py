@@ -21,16 +21,19 @@ def verify(dataset: Positional[str], *, out: Path | None = None) -> None:
     from rich.markup import escape
 
     from er_il.cli.progress import make_progress
+    from er_il.datasets.dataset import Dataset
     from er_il.datasets.hub import find_dataset
-    from er_il.datasets.verification import verify as verify_dataset
-    from er_il.report.tables import terminal_table
-    from er_il.report.text import sentences, table
-    from er_il.report.verification import verification_figure
     from er_il.support.errors import DatasetError
     from er_il.support.provenance import provenance
     from er_il.support.workers import cores
 
     folder = find_dataset(dataset)
+    _ = Dataset(folder).layout  # seconds of imports follow: mistakes are told before
+    from er_il.datasets.verification import verify as verify_dataset
+    from er_il.report.tables import terminal_table
+    from er_il.report.text import sentences, table
+    from er_il.report.verification import verification_figure
+
     console = Console()
     with make_progress(console) as progress:
         bar = progress.add_task("Verify", total=None)

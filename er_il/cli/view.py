@@ -31,14 +31,18 @@ def view(
 
     from rich.console import Console
 
-    from er_il.viewer import show
+    from er_il.viewer.destination import check_file, require_display
     from er_il.viewer.source import read_source
 
     console = Console()
     spawn = spawn or not (save or serve)
     if spawn:
-        show.require_display()
+        require_display()
+    if save:
+        check_file(save)
     trace, shapes = read_source(source, episode, arm)
+    from er_il.viewer import show  # Rerun: a second of imports
+
     if not shapes:
         console.print("No simulated task made this: the arm is shown without its world.", highlight=False)
     if save:

@@ -7,7 +7,6 @@ leader's: it leads back (Laskey et al., DART: Noise Injection for Robust Imitati
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 CORRELATION = 0.3  # [s] for which a push lasts
 CALM_BEFORE, CALM_AFTER = 0.2, 1.0  # [s] around a movement of the gripper: a push would tip what it grasps
@@ -26,6 +25,8 @@ def disturbances(script: Floats, deviation: float, period: float, rng: np.random
         period: Time [s] of a control step.
         rng: Source of randomness.
     """
+    from scipy.signal import lfilter  # takes a second, of every command that knows recipes
+
     steps, joints = script.shape[0], script.shape[1] - 1
     keep = np.exp(-period / CORRELATION)
     pushes = lfilter([np.sqrt(1 - keep**2)], [1, -keep], rng.standard_normal((steps, joints)), axis=0)

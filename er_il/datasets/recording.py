@@ -3,37 +3,22 @@
 import errno
 import os
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-import av.logging
-import gymnasium
-import numpy as np
-from lerobot.datasets import LeRobotDataset
-from lerobot.datasets.io_utils import write_info
-from lerobot.utils.utils import SuppressProgressBars
 from rich.progress import Progress
 
 from er_il.arms.arm import Arm
 from er_il.datasets.dataset import Dataset, datasets_in
 from er_il.datasets.demos import Demo, collect, demo_path, make_world
-from er_il.datasets.encoding import encode_dataset
-from er_il.datasets.normalisation import bound_rotation_deviation, normalise_observations
 from er_il.datasets.recipe import Recipe
 from er_il.datasets.record import DatasetRecord
-from er_il.datasets.schema import DEMO_SEED, ENVIRONMENT_STATE, IMAGES, LEADER_JOINTS, STATE, features
-from er_il.envs.protocol import arm_env
 from er_il.spaces.layout import Layout
 from er_il.spaces.registry import check_space, make_arm_space
-from er_il.spaces.spec import ACTION
 from er_il.support.atomic_files import work_folder, write_json
 from er_il.support.errors import DatasetError
-
-# LeRobot's encoder drops frames when its queue is full, as a live camera's must be; ours can wait.
-_QUEUE_SIZE = 1_000_000
 
 _DEMOS, _DATASET, _RECIPE = "demos", "dataset", "recipe.json"  # in the folder of an unfinished run
 
@@ -69,7 +54,7 @@ def generate(recipe: Recipe, spaces: Sequence[str], out: Path, progress: Progres
     for space in asked or ("",):
         check_space(space)
         layouts[space] = Layout.of_space(make_arm_space(space, Arm.preset(recipe.arm)))  # raises if the arm has none
-    with _writing_to(out), SuppressProgressBars(), work_folder(out) as work:
+    with _writing_to(out), work_folder(out) as work:
         there = {path.name for path in datasets_in(out)} | {space for space in asked if (out / space).exists()}
         for space in sorted(there):
             _check_same(recipe, DatasetRecord.read(out / space).recipe, out / space)
@@ -77,9 +62,8 @@ def generate(recipe: Recipe, spaces: Sequence[str], out: Path, progress: Progres
         first = out / min(there, default=asked[0])
         if not there:
             _record(recipe, layouts[first.name], first, work, progress, workers)
-        if missing := [space for space in new if out / space != first]:
-            for space in progress.track(missing, description="Encode in the other spaces"):
-                encode_dataset(Dataset(first), out / space, layouts[space])
+        if missing := {space: layouts[space] for space in new if out / space != first}:
+            _encode(Dataset(first), out, missing, progress)
         for leftover in (work / _DEMOS, work / _DATASET):
             shutil.rmtree(leftover, ignore_errors=True)
         (work / _RECIPE).unlink(missing_ok=True)
@@ -91,9 +75,11 @@ def _record(recipe: Recipe, layout: Layout, target: Path, work: Path, progress: 
     world = make_world(recipe)
     try:
         world.reset(seed=0)  # what cannot be rendered shows here, not in a worker
-        dropped: dict[int, str] = {}
         demos = _claim(work, recipe)
-        writer = _Writer(recipe, world, layout, work / _DATASET)
+        from er_il.datasets.writer import Writer  # LeRobot: seconds of imports; mistakes are told before
+
+        dropped: dict[int, str] = {}
+        writer = Writer(recipe, world, layout, work / _DATASET)
         bar = progress.add_task(f"Record {recipe.task}", total=recipe.episodes)
         for seed, reason in collect(recipe, demos, workers):
             if reason:
@@ -109,56 +95,15 @@ def _record(recipe: Recipe, layout: Layout, target: Path, work: Path, progress: 
     (work / _DATASET).rename(target)
 
 
-class _Writer:
-    """Writes demos as a LeRobot dataset."""
+def _encode(first: Dataset, out: Path, layouts: Mapping[str, Layout], progress: Progress) -> None:
+    """Write the first dataset again in other spaces."""
+    from lerobot.utils.utils import SuppressProgressBars
 
-    def __init__(self, recipe: Recipe, world: gymnasium.Env[Any, Any], layout: Layout, root: Path) -> None:
-        # Without LeRobot's footers, which it writes at the end, an interrupted dataset is unreadable.
-        shutil.rmtree(root, ignore_errors=True)
-        self._recipe, self._layout = recipe, layout
-        os.environ.setdefault("SVT_LOG", "1")  # errors only: the encoders would bury the progress bar
-        av.logging.set_libav_level(av.logging.ERROR)
-        inner = arm_env(world)
-        self._description: str = inner.task_description
-        self._dataset = LeRobotDataset.create(
-            repo_id=f"er_il/{recipe.task}",
-            root=root,
-            fps=world.metadata["render_fps"],
-            features=features(
-                layout,
-                inner.state_names,
-                inner.environment_state_names,
-                recipe.cameras,
-                recipe.image_size,
-            ),
-            robot_type=recipe.arm,
-            video_backend="pyav",
-            streaming_encoding=True,
-            encoder_queue_maxsize=_QUEUE_SIZE,
-        )
+    from er_il.datasets.encoding import encode_dataset
 
-    def add(self, demo: Demo) -> None:
-        actions = self._layout.encode(demo.joints).astype(np.float32)
-        for step in range(len(demo)):
-            frame = {
-                ACTION: actions[step],
-                STATE: demo.state[step],
-                ENVIRONMENT_STATE: demo.environment_state[step],
-                LEADER_JOINTS: demo.joints[step],
-                DEMO_SEED: np.array([demo.seed]),
-                "task": self._description,
-            }
-            self._dataset.add_frame(frame | {IMAGES + name: images[step] for name, images in demo.images.items()})
-        self._dataset.save_episode()
-
-    def finish(self, dropped: dict[int, str]) -> None:
-        self._dataset.finalize()
-        info = self._dataset.meta.info
-        info.splits = self._recipe.splits
-        write_info(info, self._dataset.root)
-        normalise_observations(self._dataset.root)
-        bound_rotation_deviation(self._dataset.root)
-        DatasetRecord(self._recipe, dropped).write(self._dataset.root)
+    with SuppressProgressBars():
+        for space in progress.track(layouts, description="Encode in the other spaces"):
+            encode_dataset(first, out / space, layouts[space])
 
 
 def _claim(work: Path, recipe: Recipe) -> Path:

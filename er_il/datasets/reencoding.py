@@ -6,13 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from er_il.datasets import card
 from er_il.datasets.dataset import Dataset
-from er_il.datasets.encoding import decode_dataset, encode_dataset
 from er_il.datasets.hub import find_dataset
 from er_il.datasets.wiring import Wiring, wire
 from er_il.spaces.joint import JOINT
 from er_il.spaces.layout import Layout
+from er_il.support.atomic_files import check_absent
 from er_il.support.errors import DatasetError
 
 
@@ -63,6 +62,10 @@ def reencode(
         layout = wire(wirings, dataset.features, kind, rotation)
     encoded = dataset.specified and dataset.spec["space"] != JOINT
     decode = encoded and (kind == JOINT or dataset.joints_column(layout) is None)
+    check_absent(target)
+    from er_il.datasets import card  # LeRobot: seconds of imports; mistakes are told before
+    from er_il.datasets.encoding import decode_dataset, encode_dataset
+
     done = 0
 
     def advance(frames: int) -> None:

@@ -16,6 +16,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
+from er_il.kinematics.rotation import Quaternion
 from er_il.spaces.base import ArmSpace
 from er_il.spaces.spec import action_spec
 from er_il.support.errors import DatasetError, PolicyError
@@ -60,6 +61,11 @@ class Contract:
             if tag.startswith(PREFIX) and len(parts) == len(fields(cls)):
                 return cls(*parts)
         return None
+
+    @property
+    def rotation_code(self) -> str:
+        """Rotation code of an environment that fulfils the contract."""
+        return Quaternion.kind if self.rotation == NONE else self.rotation
 
     @property
     def tag(self) -> str:
@@ -138,9 +144,11 @@ def _of_dataset(policy: Path) -> Contract | None:
 
 
 def _tags(policy: str | Path) -> list[str] | None:
-    from lerobot.configs import PreTrainedConfig
-
     try:
+        if (config := Path(policy) / "config.json").is_file():
+            return json.loads(config.read_text()).get("tags")
+        from lerobot.configs import PreTrainedConfig  # seconds of imports that a folder does without
+
         return PreTrainedConfig.from_pretrained(policy).tags
     except (OSError, ValueError) as error:  # huggingface_hub's errors derive from these
         raise PolicyError(f"No policy at {policy}: {str(error).splitlines()[0]}") from error

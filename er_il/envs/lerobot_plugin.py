@@ -1,7 +1,9 @@
 """The environments as LeRobot knows them: ``--env.type=er_il --env.task=reach_cup --env.action_space=erj``."""
 
+import sys
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
+from multiprocessing import get_context
 from typing import Any
 
 import gymnasium
@@ -36,6 +38,9 @@ class ErIlEnvConfig(EnvConfig):
         on_invalid: What the arm does with an invalid action: ``best_effort``, ``hold``, ``stop``.
         cameras: Cameras that the policy sees, none for a state-based policy.
         image_size: Width and height of their images [px].
+        visualization_width: Width of the stock commands' films [px], which LeRobot holds in memory twice until all
+            are written.
+        visualization_height: Height of these [px].
     """
 
     task: str | None = "reach_cup"
@@ -48,6 +53,8 @@ class ErIlEnvConfig(EnvConfig):
     on_invalid: str = BEST_EFFORT
     cameras: list[str] = field(default_factory=list)
     image_size: int = 96
+    visualization_width: int = 320
+    visualization_height: int = 240
 
     def __post_init__(self) -> None:
         check_answer(self.on_invalid)
@@ -68,6 +75,8 @@ class ErIlEnvConfig(EnvConfig):
             "cameras": tuple(self.cameras),
             "image_size": self.image_size,
             "render_mode": "rgb_array",  # the stock commands film some episodes
+            "visualization_width": self.visualization_width,
+            "visualization_height": self.visualization_height,
         }
 
     def make(self) -> ActionSpaceEnv:
@@ -99,7 +108,10 @@ class ErIlEnvConfig(EnvConfig):
         factories = [freeze_after_episode_end(self._maker)] * n_envs
         vector: VectorEnv
         if use_async_envs and n_envs > 1:
-            # OpenGL contexts do not survive a fork.
+            # OpenGL contexts do not survive a fork, but imports do: workers begin with those of the running command,
+            # where each would spend seconds and half a gigabyte on its own.
+            command = [name for name in sys.modules if name.startswith("lerobot.scripts.")]
+            get_context("forkserver").set_forkserver_preload([*command, __name__])
             vector = AsyncVectorEnv(factories, context="forkserver", autoreset_mode=AutoresetMode.NEXT_STEP)
         else:
             vector = SyncVectorEnv(factories, autoreset_mode=AutoresetMode.NEXT_STEP)

@@ -9,12 +9,13 @@ from lerobot.envs.utils import NEW_ROLLOUT_OPTION
 from numpy.typing import NDArray
 
 from er_il.envs.contract import check_policy
-from er_il.evaluation.rollouts import TIMEOUT
+from er_il.evaluation.rollout import TIMEOUT
 from er_il.evaluation.trace import Trace
 from er_il.policy.actor import Actor, environment_of, one_thread
 from er_il.spaces.action_space import ActionSpace
 
 SUCCESS = "success"
+PICTURE = (640, 480)  # [px] width and height
 Picture = NDArray[np.uint8]  # (H, W, 3)
 
 
@@ -31,6 +32,7 @@ def record_rollout(
         film_every: Take a picture each so many control steps, and one at the end; 0: none.
     """
     config = environment_of(policy, task, decoder_name)
+    config.visualization_width, config.visualization_height = PICTURE
     rows: dict[str, list[Any]] = {key: [] for key in ("q", "gripper", "action", "command", "status", "state")}
     pictures: list[Picture] = []
     with closing(config.make()) as env, one_thread():

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from er_il.arms.arm import Arm
-from er_il.datasets.dataset import INFO, Dataset, datasets_in
+from er_il.datasets.dataset import Dataset
 from er_il.datasets.recipe import Recipe
 from er_il.datasets.record import DatasetRecord, RecordedEpisode, read_episodes
 from er_il.envs.decoders import DECODERS, decoder
@@ -24,7 +24,6 @@ from er_il.evaluation.results import summarise
 from er_il.kinematics.rotation import Quaternion
 from er_il.spaces.registry import arm_space_from_spec, name_of
 from er_il.support.atomic_files import write_json
-from er_il.support.errors import DatasetError
 from er_il.support.workers import StatefulWorkers
 
 # [s] The last action is held that long at most: a grip found a little later than in the demo is a grip all the same.
@@ -129,25 +128,6 @@ def replay_demo(world: ActionSpaceEnv, demo: RecordedEpisode) -> Replayed:
     success = bool(info["is_success"])
     failure = "" if success else info["failure"] or "unfinished"
     return Replayed(demo.seed, success, failure, deviation, joint_step, statuses)
-
-
-def find_datasets(names: Sequence[str]) -> list[Path]:
-    """Resolve what a user names: a dataset, a folder of datasets, or a task (its folder in ``datasets``).
-
-    Raises:
-        DatasetError: nothing is there.
-    """
-    found = []
-    for name in names:
-        folder = next((path for path in (Path(name), Path("datasets") / name) if path.is_dir()), None)
-        inside = [] if folder is None else datasets_in(folder)
-        if folder is not None and (folder / INFO).is_file():
-            found.append(folder)
-        elif inside:
-            found += inside
-        else:
-            raise DatasetError(f"No dataset at {name}. Generate one first: er-il generate TASK.")
-    return found
 
 
 def write_report(cells: Sequence[ReplayCell], meta: dict[str, Any], path: Path) -> None:

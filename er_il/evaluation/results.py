@@ -3,13 +3,13 @@
 import json
 from collections import Counter
 from collections.abc import Hashable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from er_il.evaluation.rollout import Rollout
 from er_il.evaluation.statistics import exact_interval, paired_difference
 from er_il.kinematics.solver import Status
 from er_il.support.atomic_files import write_atomically
@@ -22,29 +22,6 @@ CELL = ["task", "decoder", "demonstrations"]
 LABELS = [*CELL, "training_seed"]
 COUNTS = ["seed", "success", "failure", "steps", "invalid", "max_joint_step"]
 COLUMNS = [*LABELS, *COUNTS, "elbow_error"]  # of a CSV; in memory there are statuses and latencies, too
-
-
-@dataclass(frozen=True)
-class Rollout:
-    """One rollout."""
-
-    seed: int
-    success: bool
-    failure: str  # "" after success
-    statuses: Counter[str]  # of decoding, one a step
-    latencies: tuple[float, ...]  # [s] of decoding, one a step
-    joint_step: float  # [rad] largest joint change that a decoded action asked for
-    elbow_error: float | None = None  # [m] see :class:`er_il.evaluation.elbow.ElbowReference`; None: not measured
-
-    @property
-    def steps(self) -> int:
-        """Number of control steps."""
-        return len(self.latencies)
-
-    @property
-    def invalid(self) -> int:
-        """Number of actions whose status was not OK."""
-        return self.steps - self.statuses[Status.OK]
 
 
 def save_rollouts(rollouts: Sequence[Rollout], path: Path, notes: Mapping[str, Any]) -> None:

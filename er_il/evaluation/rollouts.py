@@ -10,14 +10,12 @@ from gymnasium.vector import SyncVectorEnv
 from lerobot.envs.utils import NEW_ROLLOUT_OPTION
 
 from er_il.control.commander import BEST_EFFORT
-from er_il.envs.contract import check_policy
+from er_il.evaluation.checks import check_evaluation
 from er_il.evaluation.elbow import ElbowReference
-from er_il.evaluation.results import Rollout
-from er_il.policy.actor import POLICY_ROWS, Actor, environment_of, one_thread
+from er_il.evaluation.rollout import FIRST_SEED, TIMEOUT, Rollout
+from er_il.policy.actor import Actor, environment_of, one_thread
+from er_il.policy.rows import POLICY_ROWS
 from er_il.support.errors import ErIlError
-
-FIRST_SEED = 1000  # LeRobot's own; demonstrations use seeds from a million up
-TIMEOUT = "timeout"
 
 
 def evaluate(
@@ -53,15 +51,13 @@ def evaluate(
         UnknownNameError: no such task or decoder.
         ErIlError: no episodes.
     """
-    if episodes < 1:
-        raise ErIlError(f"{episodes} episodes say nothing; ask for at least one.")
+    check_evaluation(policy, task, decoder_name, episodes, on_invalid)
     if not 1 <= batch_size <= POLICY_ROWS:
         raise ErIlError(f"The batch size is {batch_size}; it must be between 1 and {POLICY_ROWS}.")
     config = environment_of(policy, task, decoder_name, on_invalid, posture)
     vector = config.create_envs(min(batch_size, episodes))[config.type][0]
     assert isinstance(vector, SyncVectorEnv)
     with closing(vector), one_thread():
-        check_policy(policy, vector.get_attr("space")[0])
         actor = Actor.load(policy, config)
         done: list[Rollout] = []
         while len(done) < episodes:

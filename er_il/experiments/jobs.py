@@ -17,13 +17,9 @@ from er_il.datasets.recording import generate
 from er_il.envs.contract import dataset_info
 from er_il.evaluation.elbow import ElbowReference
 from er_il.evaluation.posture_baselines import POSTURE_BASELINES, POSTURE_DECODER
-from er_il.evaluation.recording import record_rollout
-from er_il.evaluation.results import save_rollouts
-from er_il.evaluation.rollouts import evaluate
 from er_il.experiments.schedule import Job
 from er_il.policy.configuration import default_config
 from er_il.policy.training import PRECISION, Training, train_episodes
-from er_il.report.films import write_film
 from er_il.spaces.registry import arm_space_from_spec
 from er_il.spaces.spec import action_spec
 from er_il.support.atomic_files import write_json
@@ -104,6 +100,9 @@ class RollOut(Job):
     stage = "Roll out"
 
     def run(self) -> None:
+        from er_il.evaluation.results import save_rollouts
+        from er_il.evaluation.rollouts import evaluate
+
         training = self.needs[0].training
         leader, elbow = _demonstrated(training)
         posture = POSTURE_BASELINES.get(self.decoder)
@@ -136,7 +135,9 @@ class Film(Job):
         return self.path.with_suffix(".mp4"), self.path.with_suffix(".rrd"), self.path
 
     def run(self) -> None:
-        from er_il.viewer import save_rollout
+        from er_il.evaluation.recording import record_rollout
+        from er_il.report.films import write_film
+        from er_il.viewer.show import save_rollout
 
         training, (film, recording, path) = self.needs[0].training, self.files
         trace, pictures = record_rollout(training.policy, training.task, self.decoder, self.seed, FILM_EVERY)

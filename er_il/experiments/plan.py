@@ -10,21 +10,23 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-import pandas as pd
 import yaml
 
 from er_il.datasets.record import DatasetRecord
 from er_il.evaluation.posture_baselines import space_of
-from er_il.evaluation.results import load_rollouts, long_form
-from er_il.evaluation.rollouts import FIRST_SEED
+from er_il.evaluation.rollout import FIRST_SEED
 from er_il.experiments.grid import Cell, Grid
 from er_il.experiments.jobs import Demonstrate, RollOut, Train
-from er_il.policy.actor import POLICY_ROWS
 from er_il.policy.configuration import default_config, default_steps
+from er_il.policy.rows import POLICY_ROWS
 from er_il.support.atomic_files import write_json
 from er_il.support.errors import ErIlError
 from er_il.support.folder_lock import LOCK, folder_lock
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 OWNER = "benchmark.json"
 
@@ -42,18 +44,25 @@ class Plan:
         """Make the folder this grid's own, and work in it alone.
 
         Raises:
-            ErIlError: another command works in it, or it holds something else, demonstrations of another recipe
-                than today's, or policies trained by another configuration.
+            ErIlError: another command works in it, or :meth:`check` refuses it.
         """
+        self.check()  # a folder of something else is left as it is, without a lock
         self.out.mkdir(parents=True, exist_ok=True)
-        found = {path.name for path in self.out.iterdir()}
-        if found - {LOCK} and OWNER not in found:  # left as it is, without a lock
-            raise ErIlError(f"{self.out} holds something else than an experiment; choose another --out.")
         with folder_lock(self.out):
-            self._claim()
+            write_json(self.out / OWNER, self.check())
             yield
 
-    def _claim(self) -> None:
+    def check(self) -> dict[str, Any]:
+        """Check that the folder is this grid's own or can become it; return what it is to say of its owner.
+
+        Raises:
+            ErIlError: it holds something else, demonstrations of another recipe than today's, or policies trained by
+                another configuration.
+        """
+        owner, grid = self.out / OWNER, self.grid
+        found = {path.name for path in self.out.iterdir()} if self.out.exists() else set()
+        if found - {LOCK} and OWNER not in found:
+            raise ErIlError(f"{self.out} holds something else than an experiment; choose another --out.")
         for task, demonstrate in self._demonstrations.items():
             for dataset in filter(Path.exists, (demonstrate.path / space for space in demonstrate.spaces)):
                 if what := demonstrate.recipe.differences(DatasetRecord.read(dataset).recipe):
@@ -61,18 +70,17 @@ class Plan:
                         f"{dataset} holds another recipe's demonstrations; asked for is {what}. "
                         f"Choose another --out, or delete what {self.out} holds of {task}."
                     )
-        owner, grid = self.out / OWNER, self.grid
         mine = {name: yaml.safe_load(default_config(name, grid.configuration).read_text()) for name in grid.spaces}
-        found = json.loads(owner.read_text()) if owner.exists() else {"title": grid.title, "configurations": {}}
-        if found["title"] != grid.title:
-            raise ErIlError(f"{self.out} belongs to the grid {found['title']!r}; choose another --out.")
-        theirs = found["configurations"]
+        owned = json.loads(owner.read_text()) if owner.exists() else {"title": grid.title, "configurations": {}}
+        if owned["title"] != grid.title:
+            raise ErIlError(f"{self.out} belongs to the grid {owned['title']!r}; choose another --out.")
+        theirs = owned["configurations"]
         if changed := [name for name in mine if name in theirs and mine[name] != theirs[name]]:
             raise ErIlError(
                 f"{self.out} holds policies trained by other configurations than today's, of "
                 f"{', '.join(changed)}; choose another --out, or delete it."
             )
-        write_json(owner, {"title": grid.title, "configurations": theirs | mine})
+        return {"title": grid.title, "configurations": theirs | mine}
 
     @cached_property
     def _demonstrations(self) -> dict[str, Demonstrate]:
@@ -124,8 +132,10 @@ class Plan:
         """The cells whose rollouts are all done."""
         return [cell for cell, jobs in self.targets.items() if all(job.done for job in jobs)]
 
-    def rollouts(self, *cells: Cell) -> pd.DataFrame:
+    def rollouts(self, *cells: Cell) -> "pd.DataFrame":
         """The rollouts of complete cells in long form (:func:`er_il.evaluation.results.long_form`)."""
+        from er_il.evaluation.results import load_rollouts, long_form  # pandas: a second that mistakes do without
+
         return long_form(
             (vars(cell) | {"training_seed": job.needs[0].seed}, load_rollouts(job.path))
             for cell in cells

@@ -11,7 +11,7 @@ from typing import Any
 from rich.progress import Progress
 
 from er_il.evaluation.results import EPISODES, RESULTS, as_csv, load_notes, report_cells
-from er_il.evaluation.rollouts import FIRST_SEED
+from er_il.evaluation.rollout import FIRST_SEED
 from er_il.experiments.films import films, show
 from er_il.experiments.plan import Plan
 from er_il.experiments.schedule import Executor, Schedule

@@ -16,16 +16,11 @@ from lerobot.utils.constants import OBS_IMAGES
 from threadpoolctl import threadpool_limits
 
 from er_il.control.commander import BEST_EFFORT
-from er_il.envs.contract import NONE, policy_contract
+from er_il.envs.contract import policy_contract
 from er_il.envs.decoders import decoder
 from er_il.envs.lerobot_plugin import ErIlEnvConfig
-from er_il.kinematics.rotation import Quaternion
+from er_il.policy.rows import POLICY_ROWS
 from er_il.support.errors import PolicyError
-
-# Matrix products of another shape round differently, and contact amplifies the last bit into another
-# outcome. So the policy always sees this many rows, the missing ones filled up: then an episode's
-# outcome depends on its seed alone, not on how many run beside it.
-POLICY_ROWS = 25
 
 
 def environment_of(
@@ -44,7 +39,7 @@ def environment_of(
         action_space=chosen.space,
         resolution=chosen.resolution,
         posture=list(posture),
-        rotation=Quaternion.kind if contract.rotation == NONE else contract.rotation,
+        rotation=contract.rotation_code,
         arm=contract.arm,
         on_invalid=on_invalid,
         cameras=[key.removeprefix(f"{OBS_IMAGES}.") for key in images],

@@ -1,5 +1,6 @@
 """Files and folders that are complete or absent: written under another name, then renamed."""
 
+import errno
 import json
 import shutil
 from collections.abc import Callable, Iterator, Mapping
@@ -56,8 +57,7 @@ def atomic_folder(target: Path) -> Iterator[Path]:
         FileExistsError: the target exists.
         ErIlError: another process is writing it.
     """
-    if target.exists():
-        raise FileExistsError(17, "The target exists already", str(target))
+    check_absent(target)
     with work_folder(target) as work:
         _clear(work)
         try:
@@ -65,6 +65,12 @@ def atomic_folder(target: Path) -> Iterator[Path]:
             (work / target.name).rename(target)
         finally:
             _clear(work)
+
+
+def check_absent(target: Path) -> None:
+    """Raise a FileExistsError if there is something where a folder is to be written."""
+    if target.exists():
+        raise FileExistsError(errno.EEXIST, "The target exists already", str(target))
 
 
 @contextmanager

@@ -13,10 +13,10 @@ from er_il.support.atomic_files import write_atomically
 from er_il.support.display import has_display
 from er_il.support.errors import ErIlError
 from er_il.support.shapes import Shape
+from er_il.viewer.destination import check_file
 from er_il.viewer.recording import log_episode, open_recording
 from er_il.viewer.source import shapes_of
 
-SUFFIX = ".rrd"  # by which Rerun knows its files
 GRPC_PORT, WEB_PORT = 9876, 9090  # Rerun's own
 
 
@@ -31,8 +31,7 @@ def save_recording(trace: Trace, shapes: Sequence[Shape], path: Path) -> None:
     Raises:
         ErIlError: the path does not end in ``.rrd``, or the file cannot be written.
     """
-    if path.suffix != SUFFIX:
-        raise ErIlError(f"Rerun knows its files by {SUFFIX}; {path} ends in {path.suffix or 'nothing'}.")
+    check_file(path)
     recording = open_recording(trace)
     memory = recording.memory_recording()  # Rerun's own way to a file waits for ever if the disk is full
     log_episode(recording, trace, shapes)
@@ -40,19 +39,6 @@ def save_recording(trace: Trace, shapes: Sequence[Shape], path: Path) -> None:
         write_atomically(path, lambda partial: partial.write_bytes(memory.drain_as_bytes()))
     except OSError as error:
         raise ErIlError(f"Cannot write {path}: {error.strerror}.") from error
-
-
-def require_display() -> None:
-    """Refuse to go on without a screen.
-
-    Raises:
-        ErIlError: there is none.
-    """
-    if not has_display():
-        raise ErIlError(
-            "There is no display for the viewer. Use --save FILE.rrd and open the file with `rerun` elsewhere, "
-            "or --serve and look at it in a browser."
-        )
 
 
 def spawn(trace: Trace, shapes: Sequence[Shape]) -> None:

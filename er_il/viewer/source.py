@@ -13,6 +13,7 @@ from er_il.envs.tasks import task_id, task_names
 from er_il.evaluation.trace import SUFFIX, Trace
 from er_il.support.errors import DatasetError
 from er_il.support.shapes import Shape
+from er_il.viewer.episode import trace_of_episode
 
 
 def read_source(source: Path, episode: int | None = None, arm: str = "") -> tuple[Trace, list[Shape]]:
@@ -28,8 +29,6 @@ def read_source(source: Path, episode: int | None = None, arm: str = "") -> tupl
         UnknownNameError: the dataset has no such arm.
     """
     if source.is_dir():
-        from er_il.viewer.episode import trace_of_episode  # LeRobot: seconds of imports that a trace does without
-
         trace = trace_of_episode(source, episode or 0, arm)
         if not (source / RECORD).is_file():
             return trace, []

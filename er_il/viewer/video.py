@@ -3,7 +3,6 @@
 import io
 
 import numpy as np
-from lerobot.datasets.video_utils import decode_video_frames
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -42,6 +41,8 @@ def _from_video(dataset: Dataset, name: str, number: int, length: int) -> Frames
     if not path.is_file():
         raise DatasetError(f"The video {path} is missing.")
     times = episode[start] + np.arange(length) / dataset.fps
+    from lerobot.datasets.video_utils import decode_video_frames  # seconds of imports that states do without
+
     # torchcodec, LeRobot's first choice, needs a system-wide ffmpeg; PyAV brings its own.
     frames = decode_video_frames(path, times.tolist(), 0.5 / dataset.fps, backend="pyav", return_uint8=True)
     return frames.permute(0, 2, 3, 1).numpy()

@@ -16,7 +16,7 @@ from er_il.support.shapes import Shape
 from sim_tasks.tasks.observation import Observer, object_pose
 from sim_tasks.tasks.registration import Demonstrator, leader_class, registration
 from sim_tasks.tasks.rewards import Reward, total
-from sim_tasks.world.camera import Cameras
+from sim_tasks.world.camera import PICTURE, Cameras
 from sim_tasks.world.contact import contact_force
 from sim_tasks.world.geometry import world_shapes
 from sim_tasks.world.randomisation import span
@@ -58,6 +58,8 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
         cameras: Sequence[str] = (),
         image_size: int = 96,
         render_mode: str | None = None,
+        visualization_width: int = PICTURE[1],
+        visualization_height: int = PICTURE[0],
         arm: str = "panda",
         start_range: float = 0.02,
         **leader_settings: Any,
@@ -68,6 +70,8 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
             cameras: Cameras to observe; none by default, which needs no GL.
             image_size: Side [px] of their square images.
             render_mode: ``rgb_array`` for :meth:`render`.
+            visualization_width: Width [px] of the pictures of :meth:`render`.
+            visualization_height: Height [px] of these.
             arm: Preset of the follower and the leader, one of the task's ``arms``.
             start_range: Each of the last seven joints starts up to this far [rad] from the start posture.
             leader_settings: Keyword arguments of the task's leader.
@@ -92,7 +96,7 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
         self._fingers = [{self.model.body(name).id} for name in FINGER_BODIES]
         self._obstacles = {self.model.body(name).id for name in self.obstacles}
         self._substeps = round(1 / RATE / self.model.opt.timestep)
-        self._cameras = Cameras(self.model, cameras, image_size)
+        self._cameras = Cameras(self.model, cameras, image_size, (visualization_height, visualization_width))
         self._observer = Observer(self.arm, self.robot, self.objects, self._cameras)
         self._steps = self._success_steps = 0
         lower, upper = np.append(self.arm.lower, 0.0), np.append(self.arm.upper, 1.0)

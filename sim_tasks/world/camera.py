@@ -11,6 +11,7 @@ from er_il.support.errors import ErIlError, RenderError, UnknownNameError
 
 LARGEST_PICTURE = 1024  # [px]
 PICTURE = (480, 640)  # [px] height and width of pictures for people
+SHADOW = 2048  # [px] side of the shadow map of such a picture: that of a smaller one is as much smaller
 UP = (0.0, 0.0, 1.0)
 
 
@@ -51,16 +52,21 @@ VIEWS = (
 class Cameras:
     """Renders a model's cameras; contexts are made on first use, so that states alone need no GL."""
 
-    def __init__(self, model: mujoco.MjModel, names: Sequence[str], size: int) -> None:
+    def __init__(
+        self, model: mujoco.MjModel, names: Sequence[str], size: int, picture: tuple[int, int] = PICTURE
+    ) -> None:
+        """Prepare images of ``names``, squares of ``size`` [px], and pictures for people, height by width [px]."""
         known = [model.camera(i).name for i in range(model.ncam)]
         for name in names:
             if name not in known:
                 raise UnknownNameError("camera", name, known)
-        if names and not 1 <= size <= LARGEST_PICTURE:
-            raise ErIlError(f"Image size {size} is not between 1 and {LARGEST_PICTURE} px.")
+        for side in (size, *picture) if names else picture:
+            if not 1 <= side <= LARGEST_PICTURE:
+                raise ErIlError(f"Image size {side} is not between 1 and {LARGEST_PICTURE} px.")
         self.names = tuple(names)
         self._model = model
         self.size = size
+        self._picture = picture
         self._policy: mujoco.Renderer | None = None
         self._people: mujoco.Renderer | None = None
 
@@ -79,7 +85,7 @@ class Cameras:
     def picture(self, data: mujoco.MjData, camera: str = SHOWCASE) -> np.ndarray:
         """A picture (H, W, 3) uint8 for people, with shadows and smooth edges."""
         if self._people is None:
-            self._people = _renderer(self._model, *PICTURE, samples=4)
+            self._people = _renderer(self._model, *self._picture, samples=4)
         self._people.update_scene(data, camera=camera)
         return self._people.render()
 
@@ -92,7 +98,9 @@ class Cameras:
 
 
 def _renderer(model: mujoco.MjModel, height: int, width: int, samples: int) -> mujoco.Renderer:
-    model.vis.quality.offsamples = samples  # read when the context is made
+    # Read when the context is made.
+    model.vis.global_.offwidth, model.vis.global_.offheight = width, height
+    model.vis.quality.offsamples, model.vis.quality.shadowsize = samples, SHADOW * max(width, height) // PICTURE[1]
     try:
         return mujoco.Renderer(model, height, width)
     except Exception as error:  # each GL backend fails in its own way

@@ -3,7 +3,7 @@
 import mujoco
 
 from er_il.arms.arm import Arm
-from sim_tasks.world.camera import LARGEST_PICTURE, VIEWS
+from sim_tasks.world.camera import VIEWS
 from sim_tasks.world.props import BOX
 from sim_tasks.world.robot import robot_spec, shoulder_offset
 
@@ -25,10 +25,8 @@ def scene_spec(arm: Arm) -> mujoco.MjSpec:
     """Build the empty scene around a robot; tasks add their things to it."""
     spec = robot_spec(arm)
     visual = spec.visual
-    visual.global_.offwidth = visual.global_.offheight = LARGEST_PICTURE
     visual.headlight.ambient, visual.headlight.diffuse = (0.35, 0.35, 0.35), (0.35, 0.35, 0.35)
     visual.headlight.specular = (0.1, 0.1, 0.1)
-    visual.quality.shadowsize = 2048
     world = spec.worldbody
     world.add_light(pos=(0.3, 0.8, 2.6), dir=(0.1, -0.3, -1.0), diffuse=(0.55, 0.55, 0.52), castshadow=True)
     world.add_light(pos=(-1.0, -1.5, 2.2), dir=(0.5, 0.6, -0.7), diffuse=(0.2, 0.2, 0.24), castshadow=False)

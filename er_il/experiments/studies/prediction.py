@@ -5,11 +5,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import pandas as pd
-from scipy.stats import spearmanr
-
-from er_il.report.tables import joined
 from er_il.spaces.registry import split_name
 from er_il.support.errors import DatasetError
 
@@ -45,6 +40,12 @@ def predict(report: Mapping[str, Any], cells: Sequence[Mapping[str, Any]]) -> li
         succeed alike), and whether the choice with the least risk is the best trained, by number or within the best
         one's interval.
     """
+    import numpy as np
+    import pandas as pd
+    from scipy.stats import spearmanr
+
+    from er_il.report.tables import joined
+
     data = pd.DataFrame(cells, columns=pd.Index(KEYS))
     data["joints"] = [joined(split_name(decoder)[1] or report["default"]) for decoder in data["decoder"]]
     data["success"] = data["successes"] / data["episodes"]

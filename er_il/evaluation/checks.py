@@ -1,0 +1,26 @@
+"""What can be wrong with an evaluation, found without LeRobot, whose import takes seconds."""
+
+from pathlib import Path
+
+from er_il.arms.arm import Arm
+from er_il.control.commander import check_answer
+from er_il.envs.contract import check_policy, policy_contract
+from er_il.envs.decoders import decoder
+from er_il.envs.tasks import task_id
+from er_il.support.errors import ErIlError
+
+
+def check_evaluation(policy: Path, task: str, decoder_name: str, episodes: int, on_invalid: str) -> None:
+    """Refuse what :func:`er_il.evaluation.rollouts.evaluate` cannot do; the arguments are its own.
+
+    Raises:
+        PolicyError: the policy is missing, or was trained for another action space.
+        UnknownNameError: no such task, decoder, or answer to invalid actions.
+        ErIlError: no episodes.
+    """
+    if episodes < 1:
+        raise ErIlError(f"{episodes} episodes say nothing; ask for at least one.")
+    task_id(task)
+    check_answer(on_invalid)
+    chosen, contract = decoder(decoder_name), policy_contract(policy)
+    check_policy(policy, chosen.space_of(Arm.preset(contract.arm), contract.rotation_code))
