@@ -36,8 +36,8 @@ AT_LIMIT = 1e-6  # [rad] from a limit: a joint there is at it, whatever the roun
 SLACK = 1e-6  # [rad] by which a solution may pass a limit: programs keep limits to a tolerance of their own
 BLOCK = 20  # targets of a turn
 BATCHES = (1, 5, 10, 20, 50, 100, 1000)  # actions decoded together
-SINGLES = 1000  # of them at most are decoded one by one, too
-REPETITIONS = 9  # of which the quickest counts
+SINGLES = 50  # of them at most are decoded one by one, too
+REPETITIONS = 5  # of which the quickest counts
 
 Draw = Callable[[np.random.Generator], Vector]  # joint angles (n,) [rad] of a target
 

@@ -11,8 +11,6 @@ from documented import ROOT, documented
 
 from er_il.report.decode_page import write_page
 
-OWN = ("er_il", "Placo", "LeRobot")
-
 
 def measure(out: Path) -> dict[str, Any]:
     """Run the documented command; return its report."""
@@ -25,10 +23,8 @@ def measure(out: Path) -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def measured(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """The report without the other libraries, as by default."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("peers.installed", lambda module: False)
-        return measure(tmp_path_factory.mktemp("decode"))
+    """The report, the other libraries included."""
+    return measure(tmp_path_factory.mktemp("decode"))
 
 
 def rows(report: dict[str, Any], solver: str, *commands: str) -> dict[str, dict[str, Any]]:
@@ -42,7 +38,6 @@ def rows(report: dict[str, Any], solver: str, *commands: str) -> dict[str, dict[
 
 def test_er_il_solves_what_is_near_and_returns_the_joints(measured: dict[str, Any]) -> None:
     assert measured["meta"]["git"]
-    assert all(row["solver"].startswith(OWN) for row in measured["decodes"])
     for solver, command in (("er_il, ERJ", "panda_joint1"), ("er_il, ERA", "arm_angle")):
         found = rows(measured, solver, command)
         assert len(found) == 4
@@ -64,10 +59,9 @@ def test_a_pose_alone_is_met_by_other_joints(measured: dict[str, Any]) -> None:
     assert all(row["iterations_p99"] == 1 for row in once.values())
 
 
-def test_other_libraries_solve_for_a_commanded_joint(tmp_path: Path) -> None:
-    report = measure(tmp_path)
+def test_other_libraries_solve_for_a_commanded_joint(measured: dict[str, Any]) -> None:
     for solver, joint in (("mink", "panda_joint1"), ("pink", "panda_joint1"), ("GeoFIK", "panda_joint7")):
-        near = rows(report, solver, joint)["Seed ± 0.03 rad"]
+        near = rows(measured, solver, joint)["Seed ± 0.03 rad"]
         assert near["solved"] == 12
         assert near["joint_error_p99_rad"] < 0.03
 
