@@ -15,7 +15,9 @@ def _run(monkeypatch, *arguments):
 def test_generate_takes_the_recipe_and_what_is_given_instead(monkeypatch, tmp_path, capsys):
     out = tmp_path / "cups"
     _run(monkeypatch, "generate", "lift_cup", "--episodes", 2, "--seed", 4, "--spaces", "joint,erj", "--out", out)
-    assert "2 demonstrations" in capsys.readouterr().out
+    said = capsys.readouterr()
+    assert "2 demonstrations" in said.out
+    assert "Map" not in said.err  # LeRobot's own progress bars, one an episode
     assert sorted(path.name for path in out.iterdir()) == ["erj", "joint"]
     recipe = DatasetRecord.read(out / "erj").recipe
     assert (recipe.task, recipe.episodes, recipe.validation, recipe.seed) == ("lift_cup", 2, 1, 4)

@@ -28,13 +28,15 @@ def benchmark(
     """
     from rich.console import Console
 
+    from er_il.experiments.grid import Grid
+
+    asked = Grid.from_file(grid)
     from er_il.cli.progress import make_progress
     from er_il.experiments.cluster import RayExecutor
-    from er_il.experiments.grid import Grid
     from er_il.experiments.plan import Plan
     from er_il.support.workers import LocalExecutor, cores
 
-    plan = Plan(Grid.from_file(grid), (out or Path("outputs/benchmark") / grid.stem).resolve())
+    plan = Plan(asked, (out or Path("outputs/benchmark") / grid.stem).resolve())
     folder, console = results or Path("results") / grid.stem, Console()
     workplace = RayExecutor(ray_address) if ray_address else LocalExecutor(cores())
     plan.check()  # seconds of imports follow: mistakes are told before

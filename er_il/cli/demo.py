@@ -29,12 +29,13 @@ def demo(
     from rich.console import Console
 
     from er_il.cli.benchmark import report
-    from er_il.cli.progress import make_progress
     from er_il.experiments.grid import demo_grid
+
+    grid = demo_grid(task, seed, tuple(decoders.split(",")), rollouts, demonstrations, steps)
+    from er_il.cli.progress import make_progress
     from er_il.experiments.plan import Plan
     from er_il.support.workers import LocalExecutor, cores
 
-    grid = demo_grid(task, seed, tuple(decoders.split(",")), rollouts, demonstrations, steps)
     folder, console = out or Path("outputs") / ("demo" if task == "reach_cup" else task), Console()
     plan = Plan(grid, folder.resolve(), recorders=cores())
     plan.check()  # seconds of imports follow: mistakes are told before

@@ -38,8 +38,6 @@ def generate(
 
     from er_il.cli.progress import make_progress
     from er_il.datasets.recipe import Recipe
-    from er_il.datasets.recording import generate as generate_datasets
-    from er_il.support.counts import tally
     from er_il.support.workers import cores
 
     recipe = usual = Recipe.load(task)
@@ -47,6 +45,9 @@ def generate(
         recipe = recipe.resized(episodes)
     given = {"seed": seed, "arm": arm, "cameras": _split(cameras), "image_size": size}
     recipe = recipe.replaced(**{key: value for key, value in given.items() if value is not None})
+    from er_il.datasets.recording import generate as generate_datasets
+    from er_il.support.counts import tally
+
     name = task if recipe.arm == usual.arm else f"{task}_{recipe.arm}"
     folder = out if out is not None else Path("datasets") / name
     console = Console()

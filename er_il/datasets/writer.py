@@ -10,6 +10,7 @@ import gymnasium
 import numpy as np
 from lerobot.datasets import LeRobotDataset
 from lerobot.datasets.io_utils import write_info
+from lerobot.utils.utils import SuppressProgressBars
 
 from er_il.datasets.demos import Demo
 from er_il.datasets.normalisation import bound_rotation_deviation, normalise_observations
@@ -64,7 +65,8 @@ class Writer:
                 "task": self._description,
             }
             self._dataset.add_frame(frame | {IMAGES + name: images[step] for name, images in demo.images.items()})
-        self._dataset.save_episode()
+        with SuppressProgressBars():
+            self._dataset.save_episode()
 
     def finish(self, dropped: dict[int, str]) -> None:
         self._dataset.finalize()
