@@ -45,11 +45,8 @@ def decode_episode(layout: Layout, episode: EncodedEpisode) -> DecodedEpisode:
     Seeds are the measured joints, as on a robot; without them the joint vector of the step before, which is decoded
     first where it is not known.
     """
-    known = _known(layout, episode)
-    if known is None:
-        vectors, results = _decode_in_turn(layout, episode)
-    else:
-        vectors, results = layout.decode_batch(episode.actions, *known)
+    decode = _decode_in_turn if _depends(layout, episode) else _decode_at_once
+    vectors, results = decode(layout, episode)
     at = vectors if episode.truth is None else episode.truth
     conditioning = [part.space.conditionings(layout.angles(part, at)) for part in layout.parts]
     return DecodedEpisode(
@@ -61,14 +58,17 @@ def decode_episode(layout: Layout, episode: EncodedEpisode) -> DecodedEpisode:
     )
 
 
-def _known(layout: Layout, episode: EncodedEpisode) -> tuple[Array, Array] | None:
-    """Seeds and last commands (T, D), if no step has to be decoded before another."""
-    if episode.truth is not None:
-        before = np.concatenate([episode.truth[:1], episode.truth[:-1]])
-        return before if episode.state is None else episode.state, before
-    if episode.state is not None and not any(part.space.relative for part in layout.parts):
-        return episode.state, episode.state
-    return None
+def _depends(layout: Layout, episode: EncodedEpisode) -> bool:
+    """True if a step can be decoded after the one before only: its seed or last command is what that decodes to."""
+    counted = episode.state is None or any(part.space.relative for part in layout.parts)
+    return episode.truth is None and counted
+
+
+def _decode_at_once(layout: Layout, episode: EncodedEpisode) -> tuple[Array, list[BatchResult]]:
+    """Decode all steps in a batch."""
+    commands = episode.state if episode.truth is None else np.concatenate([episode.truth[:1], episode.truth[:-1]])
+    assert commands is not None
+    return layout.decode_batch(episode.actions, commands if episode.state is None else episode.state, commands)
 
 
 def _decode_in_turn(layout: Layout, episode: EncodedEpisode) -> tuple[Array, list[BatchResult]]:
@@ -97,7 +97,7 @@ def decode_episodes(
         workers: Number of worker processes.
         advance: Called with the number of frames done since the last call.
     """
-    frames = sum(len(episode.actions) for episode in episodes if _known(layout, episode) is None)
+    frames = sum(len(episode.actions) for episode in episodes if _depends(layout, episode))
     decoded = []
     with StatefulWorkers(workers if frames > FEW_FRAMES else 1, partial(Layout.from_spec, layout.spec())) as pool:
         for result in [pool.submit(decode_episode, episode) for episode in episodes]:

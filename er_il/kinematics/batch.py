@@ -70,7 +70,7 @@ class BatchSearch:
                 step, clear = self._last(error[:, done], derivative[:, :, done])
                 q[ended] = self.moved(at[done], step)
                 near = xp.max(xp.abs(q[ended] - seeds[ended]), axis=1) <= far
-                solved[ended] = clear & near & self._inside(q[ended])
+                solved[ended] = clear & near & inside_limits(self.arm, q[ended])
             going = ~done & (angle < STRAIGHT) & (size <= before)  # one that overshot is left to the single solver
             at, error, derivative, size = at[going], error[:, going], derivative[:, :, going], size[going]
             goal, rows = goal.rows(going), rows[going]
@@ -81,7 +81,7 @@ class BatchSearch:
             longest = xp.max(xp.abs(step), axis=0)
             step = step * xp.where(longest > MAX_STEP, MAX_STEP / longest, 1.0)
             at, before = self.moved(at, step), size
-            inside = self._inside(at)
+            inside = inside_limits(self.arm, at)
             at, before, goal, rows = at[inside], before[inside], goal.rows(inside), rows[inside]
         return q, solved
 
@@ -157,11 +157,6 @@ class BatchSearch:
         clear[doubtful] = xp.linalg.svdvals(J)[:, -1] > FOLD
         return xp.permute_dims(step, (1, 0)), clear
 
-    def _inside(self, q: Any) -> Any:
-        """Mask (N,) of the joint angles (N, n) [rad] within the limits."""
-        xp = array_api.array_namespace(q)
-        return xp.all((q >= constant(self.arm.lower, q)) & (q <= constant(self.arm.upper, q)), axis=1)
-
     @property
     def _held(self) -> tuple[int, ...]:
         return () if self.redundancy is None else self.redundancy.held
@@ -169,6 +164,12 @@ class BatchSearch:
     @property
     def _free(self) -> list[int]:
         return [joint for joint in range(self.arm.dof) if joint not in self._held]
+
+
+def inside_limits(arm: Arm, q: Any) -> Any:
+    """Mask (N,) of the joint angles (N, n) [rad] within an arm's limits."""
+    xp = array_api.array_namespace(q)
+    return xp.all((q >= constant(arm.lower, q)) & (q <= constant(arm.upper, q)), axis=1)
 
 
 def _square(derivative: Any, damping: Any, xp: Any) -> tuple[Any, Any]:

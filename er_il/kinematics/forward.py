@@ -165,8 +165,6 @@ class ForwardKinematics:
         effector at the ends) goes along its axis rather than across, all joints at zero. Joints at
         the same place, as in a shoulder, are passed over.
         """
-        names = [self._model.names[joint] for joint in self._chain]
-        order = sorted(range(len(self.arm.joints)), key=lambda i: names.index(self.arm.joints[i]))
         q = np.zeros(self.arm.dof)
         axes = self.jacobian(q)[3:].T
         pin.framesForwardKinematics(self._model, self._data, self._model_q(q))
@@ -175,7 +173,7 @@ class ForwardKinematics:
         origins = [T_base_world.act(self._data.oMi[joint].translation) for joint in self._chain]
         points = [ends[0], *origins, ends[1]]
         twisting = np.empty(self.arm.dof, dtype=bool)
-        for at, i in enumerate(order):
+        for at, i in enumerate(self._chain_order):
             ways = [point - points[at + 1] for point in points]
             before = next((way for way in ways[at::-1] if np.linalg.norm(way) > ASIDE), ways[at])
             after = next((way for way in ways[at + 2 :] if np.linalg.norm(way) > ASIDE), ways[at + 2])

@@ -237,13 +237,11 @@ class LocalSearch:
             matrix, lengths = attempt.miss.equations
             push = push + lengths @ matrix
         at_lower, at_upper = at_limits(arm, q)
-        return bool(np.any(((at_lower & (push < 0)) | (at_upper & (push > 0))) & self.free(goal)))
+        return bool(np.any(((at_lower & (push < 0)) | (at_upper & (push > 0)))[self._free(goal)]))
 
-    def free(self, goal: Goal) -> NDArray[np.bool_]:
-        """Mask (n,) of the joints that the goal lets move."""
-        free = np.ones(self.arm.dof, dtype=bool)
-        free[list(goal.held)] = False
-        return free
+    def _free(self, goal: Goal) -> NDArray[np.int_]:
+        """Indices of the joints that the goal lets move."""
+        return self._program(goal, False).free
 
     def _determined(self, goal: Goal) -> bool:
         """True if the goal has isolated solutions: as many equations as free joints."""
@@ -254,12 +252,12 @@ class LocalSearch:
         jacobian = self._kinematics.jacobian(q)
         if goal.redundancy is not None and goal.equations:
             jacobian = np.vstack([jacobian, goal.redundancy.linearise(q).derivative])
-        return jacobian[:, self.free(goal)]
+        return jacobian[:, self._free(goal)]
 
     def _embedded(self, goal: Goal, free: Vector) -> Vector:
         """A change of the free joints as one of all joints (n,)."""
         v = np.zeros(self.arm.dof)
-        v[self.free(goal)] = free
+        v[self._free(goal)] = free
         return v
 
     def _program(self, goal: Goal, posture: bool) -> PoseQp:

@@ -7,7 +7,7 @@ import array_api_compat as array_api
 import numpy as np
 
 from er_il.arms.arm import Vector
-from er_il.kinematics.chain import constant
+from er_il.kinematics.batch import inside_limits
 from er_il.kinematics.search import LIMIT_MARGIN
 from er_il.kinematics.solver import IkResult, Status
 from er_il.spaces.base import ArmSpace, Array
@@ -37,8 +37,7 @@ class JointSpace(ArmSpace):
 
     def _solve_batch(self, actions: Any, seeds: Any) -> tuple[Any, Any]:
         xp = array_api.array_namespace(actions)
-        inside = (actions >= constant(self.arm.lower, actions)) & (actions <= constant(self.arm.upper, actions))
-        return xp.asarray(actions, copy=True), xp.all(inside, axis=1)
+        return xp.asarray(actions, copy=True), inside_limits(self.arm, actions)
 
     def _details(self) -> dict[str, Any]:
         return {}
