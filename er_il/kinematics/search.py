@@ -11,7 +11,6 @@ the fold. Near it the seed may lie closer to the one of the pair that the steps 
 
 import math
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 import placo  # pyright: ignore[reportMissingImports]
@@ -20,11 +19,10 @@ from scipy.linalg import lapack
 
 from er_il.arms.arm import POSE_DOF, Arm, Vector
 from er_il.kinematics.forward import ForwardKinematics
+from er_il.kinematics.goal import POSITION_TOLERANCE, Attempt, Goal, Miss
 from er_il.kinematics.qp import MAX_STEP, PoseQp
-from er_il.kinematics.redundancy import Array, Redundancy
+from er_il.kinematics.redundancy import Array
 
-POSITION_TOLERANCE = 1e-4  # [m]
-ROTATION_TOLERANCE = 1e-3  # [rad]
 MAX_ITERATIONS = 50
 DAMPING_GROWTH = 1e-2  # [1] damping per squared miss in m and rad
 CAUTION = 10.0  # damping grows by this factor after a step that overshot, and shrinks after one that did not
@@ -43,49 +41,6 @@ NEAR = 0.3  # [m and rad] a goal this close to the seed deserves further attempt
 ASIDE = (0.1, -0.1, 0.2, -0.2)  # [rad] how far beside the seed they start
 FEW_ITERATIONS = 12
 FOLD_STEP = 1e-4  # [rad] of the finite difference across the fold
-
-
-class Goal(NamedTuple):
-    """A pose and, if commanded, redundancy values to reach."""
-
-    T_base_ee: Array  # (4, 4)
-    redundancy: Redundancy | None = None
-    values: Vector = np.zeros(0)  # (m,) of the redundancy
-
-    @property
-    def held(self) -> tuple[int, ...]:
-        """Indices of the joints that stay where the start has them."""
-        return () if self.redundancy is None else self.redundancy.held
-
-    @property
-    def equations(self) -> int:
-        """Number of equations that the redundancy adds to the pose's; held joints are eliminated instead."""
-        return 0 if self.redundancy is None or self.held else len(self.redundancy.names)
-
-
-class Miss(NamedTuple):
-    """Errors of joint angles with respect to a goal."""
-
-    position: float  # [m]
-    rotation: float  # [rad]
-    size: float  # norm of what the QP corrects, the redundancy scaled to lengths
-    redundancy: float = 0.0  # [rad] of the worst redundancy value
-    equations: tuple[Array, Vector] | None = None  # scaled derivative (m, n) [m/rad], and the lengths to go (m,) [m]
-
-
-class Attempt(NamedTuple):
-    """Result of a run of iterations."""
-
-    q: Vector  # (n,) [rad]
-    miss: Miss
-    moving: bool  # it was still getting closer
-    clear: bool = False  # no fold is near
-
-    @property
-    def reached(self) -> bool:
-        """True if the goal is met within tolerance."""
-        angle = max(self.miss.rotation, self.miss.redundancy)
-        return self.miss.position <= POSITION_TOLERANCE and angle <= ROTATION_TOLERANCE
 
 
 class LocalSearch:

@@ -13,8 +13,9 @@ from er_il.arms.arm import Arm, Vector
 from er_il.kinematics.batch import BatchSearch
 from er_il.kinematics.chain import chunks
 from er_il.kinematics.forward import ForwardKinematics
+from er_il.kinematics.goal import Attempt, Goal
 from er_il.kinematics.redundancy import Array, Redundancy
-from er_il.kinematics.search import LIMIT_MARGIN, Attempt, Goal, LocalSearch
+from er_il.kinematics.search import LIMIT_MARGIN, LocalSearch
 from er_il.support.errors import ShapeError
 
 FAR = 0.3  # [rad] a solution this far from the seed is looked at with suspicion
