@@ -35,6 +35,12 @@ def one_worker(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("er_il.support.workers.cpu_count", lambda: 1)
 
 
+@pytest.fixture
+def small_films(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let films be of small pictures: each costs as long as ten steps of the world."""
+    monkeypatch.setattr("er_il.evaluation.recording.PICTURE", (160, 120))
+
+
 @pytest.fixture(scope="session")
 def reach_cup(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder of three demonstrations of Reach Cup in joint space and ERJ, recorded once a test run; only to be read."""

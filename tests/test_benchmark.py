@@ -298,7 +298,7 @@ def written(folder: Path) -> dict[Path, int]:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("quiet_logging")
+@pytest.mark.usefixtures("quiet_logging", "small_films")
 def test_a_grid_from_end_to_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

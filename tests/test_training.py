@@ -3,6 +3,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import gymnasium
 import pytest
 import torch
 from lerobot.scripts import lerobot_edit_dataset, lerobot_eval, lerobot_train
@@ -12,6 +13,7 @@ import er_il.policy.in_memory
 from er_il import cli
 from er_il.datasets.recipe import Recipe
 from er_il.datasets.recording import generate
+from er_il.envs.tasks import task_id
 from er_il.evaluation.rollouts import evaluate
 from er_il.policy.configuration import default_config, input_features
 from er_il.policy.training import Training, pretrained
@@ -41,6 +43,14 @@ def run(monkeypatch: pytest.MonkeyPatch, main: object, *arguments: str) -> None:
     """Run a stock command in this process."""
     monkeypatch.setattr(sys, "argv", ["command", *arguments])
     main()  # pyright: ignore[reportCallIssue]
+
+
+def run_in_memory(monkeypatch: pytest.MonkeyPatch, training: Training) -> None:
+    """Train as ``er-il train`` does, but in this process; test_demo's trainings run in their own."""
+    training.prepare()
+    with monkeypatch.context() as patch:
+        patch.setattr(lerobot_train, "make_train_eval_datasets", lerobot_train.make_train_eval_datasets)  # to undo
+        run(patch, er_il.policy.in_memory.main, *training.command[1:])
 
 
 def test_the_command_trains_on_the_training_episodes_and_declares_the_actions(datasets: Path, tmp_path: Path):
@@ -93,7 +103,7 @@ def test_from_demonstrations_to_a_rollout_with_the_stock_commands(
     run(monkeypatch, lerobot_train.main, *longer.command[1:])
     assert (longer.done_steps, longer.finished) == (4, True)
     in_memory = training(datasets, tmp_path / "in_memory", steps=2)
-    assert in_memory.run() == 0
+    run_in_memory(monkeypatch, in_memory)
     weights = "checkpoints/000002/pretrained_model/model.safetensors"
     assert (in_memory.out / weights).read_bytes() == (out / weights).read_bytes()
 
@@ -123,13 +133,12 @@ def test_from_images_to_a_rollout(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     stock, in_memory = (training(tmp_path, tmp_path / name, **changes) for name in ("stock", "in_memory"))
     stock.prepare()
     run(monkeypatch, lerobot_train.main, *stock.command[1:])
-    in_memory.prepare()
-    monkeypatch.setattr(lerobot_train, "make_train_eval_datasets", lerobot_train.make_train_eval_datasets)  # to undo
-    run(monkeypatch, er_il.policy.in_memory.main, *in_memory.command[1:])  # in its own process it runs above
+    run_in_memory(monkeypatch, in_memory)
     weights = [each.policy / "model.safetensors" for each in (stock, in_memory)]
     assert weights[0].read_bytes() == weights[1].read_bytes()
     seen = json.loads((stock.policy / "config.json").read_text())["input_features"]
     assert set(seen) == {"observation.state", "observation.images.shoulder"}  # the button has to be found
+    monkeypatch.setattr(gymnasium.spec(task_id("push_button_elbow")), "max_episode_steps", 20)
     (rollout,) = evaluate(stock.policy, "push_button_elbow", "erj", episodes=1, batch_size=1)
     assert rollout.steps > 5  # two steps of training may well press it
 
