@@ -38,6 +38,14 @@ class Command:
     stopped: bool = False  # the arm holds until the next reset
 
 
+@dataclass(frozen=True)
+class DecodedAhead:
+    """A command's action, decoded before together with those of other arms."""
+
+    result: IkResult
+    seconds: float  # its share of the time
+
+
 @dataclass
 class Tally:
     """Counts since the last reset."""
@@ -113,58 +121,73 @@ class Commander:
 
         A person moved it, or another program: the velocity limit must then count from where it is.
         """
-        assert self._last is not None
-        return self._far(self._last, np.asarray(q, dtype=np.float64))
+        return self._far(self.last, np.asarray(q, dtype=np.float64))
 
-    def command(self, action: ArrayLike, q: ArrayLike) -> Command:
-        """Turn an action (dim,) into the next command, given the measured joint angles q (n,) [rad]."""
+    @property
+    def last(self) -> Vector:
+        """The last command (n,) [rad], which a delta counts from.
+
+        Raises:
+            RuntimeError: there is none before :meth:`reset`.
+        """
         if self._last is None:
             raise RuntimeError("Commander.reset must be called before the first command.")
-        started = time.perf_counter()
-        decoded = self._decode(action, q)
+        return self._last
+
+    def command(self, action: ArrayLike, q: ArrayLike, ahead: DecodedAhead | None = None) -> Command:
+        """Turn an action into the next command.
+
+        Args:
+            action: (dim,) as a policy gives it.
+            q: (n,) [rad] the measured joint angles.
+            ahead: The action decoded from these angles and the last command, if it is already.
+        """
+        last = self.last
+        started = time.perf_counter() - (ahead.seconds if ahead else 0.0)
+        decoded = self._checked(ahead.result if ahead else self._decode(action, q), q)
         status = decoded.status
         follows = status is Status.OK or (self.on_invalid == BEST_EFFORT and status is not Status.INVALID)
         target = self._eased(decoded, action, q) if follows else decoded.q
         latency = time.perf_counter() - started
         self._stopped |= self.on_invalid == STOP and status is not Status.OK
-        asked = float(np.max(np.abs(decoded.q - self._last)))
-        ahead = self._limited(self._last, target)
-        follows = follows and not self._stopped and not self._runs_away(ahead, q)
+        asked = float(np.max(np.abs(decoded.q - last)))
+        nearer = self._limited(last, target)
+        follows = follows and not self._stopped and not self._runs_away(nearer, q)
         if follows:
-            self._last = ahead
+            self._last = nearer
         self.tally.statuses[status] += 1
         self.tally.latencies.append(latency)
         self.tally.largest_step = max(self.tally.largest_step, asked)
-        return Command(self._last.copy(), status, latency, decoded.iters, asked, follows, self._stopped)
+        return Command(self.last.copy(), status, latency, decoded.iters, asked, follows, self._stopped)
 
     def _decode(self, action: ArrayLike, q: ArrayLike) -> IkResult:
         measured = np.asarray(q, dtype=np.float64)
-        assert self._last is not None
         if not np.all(np.isfinite(measured)):
-            return IkResult(self._last, Status.INVALID)
-        decoded = self.space.decode(action, seed=measured, current=self._last)
+            return IkResult(self.last, Status.INVALID)
+        return self.space.decode(action, seed=measured, current=self.last)
+
+    def _checked(self, decoded: IkResult, q: ArrayLike) -> IkResult:
+        """The decoded joints, the last command if there are none; told from joints on another branch."""
         if decoded.status is Status.INVALID:
-            return replace(decoded, q=self._last)
-        jumps = decoded.status is Status.OK and self._far(decoded.q, measured)
+            return replace(decoded, q=self.last)
+        jumps = decoded.status is Status.OK and self._far(decoded.q, np.asarray(q, dtype=np.float64))
         return replace(decoded, status=Status.JUMP) if jumps else decoded
 
     def _eased(self, decoded: IkResult, action: ArrayLike, q: ArrayLike) -> Vector:
         """The decoded joints or, if they are far, as much of the action as lies near with its pose."""
         measured = np.asarray(q, dtype=np.float64)
-        assert self._last is not None
         if not self._far(decoded.q, measured):
             return decoded.q
-        eased = self.space.ease(action, measured, JUMP_PERIODS * self._reach, self._last)
+        eased = self.space.ease(action, measured, JUMP_PERIODS * self._reach, self.last)
         return decoded.q if eased is None else eased
 
     def _far(self, target: Vector, measured: Vector) -> bool:
         return bool(np.any(np.abs(target - measured) > JUMP_PERIODS * self._reach))
 
-    def _runs_away(self, ahead: Vector, q: ArrayLike) -> bool:
+    def _runs_away(self, command: Vector, q: ArrayLike) -> bool:
         """True if a command would leave behind an arm that does not come along: it waits for it instead."""
-        assert self._last is not None
         measured = np.asarray(q, dtype=np.float64)
-        lead, before = np.abs(ahead - measured), np.abs(self._last - measured)
+        lead, before = np.abs(command - measured), np.abs(self.last - measured)
         return bool(np.any((lead > LEAD_PERIODS * self._reach) & (lead > before)))
 
     def _limited(self, last: Vector, target: Vector) -> Vector:

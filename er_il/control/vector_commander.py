@@ -1,12 +1,13 @@
 """The commander of a robot's whole vector: each arm with its own commander, everything else passed through."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from er_il.arms.arm import Vector
-from er_il.control.commander import BEST_EFFORT, Command, Commander
+from er_il.control.commander import BEST_EFFORT, Command, Commander, DecodedAhead
 from er_il.spaces.layout import Layout
 from er_il.support.errors import ErIlError, ShapeError
 
@@ -49,26 +50,28 @@ class VectorCommander:
         for arm, q in zip(self.arms, self.split_measured(measured)[0], strict=True):
             arm.anchor(q)
 
-    def command(self, action: ArrayLike, measured: ArrayLike) -> VectorCommand:
+    def command(
+        self, action: ArrayLike, measured: ArrayLike, ahead: Sequence[DecodedAhead] | None = None
+    ) -> VectorCommand:
         """Turn an encoded vector into the next joint vector.
 
         Args:
             action: (len(layout.encoded_names),) as a policy gives it.
             measured: (D,) the robot's values; those of dimensions that belong to no arm are not read.
+            ahead: Each arm's action, if it is decoded already.
 
         Raises:
             ShapeError: a vector has another length.
             ErIlError: nothing finite was ever commanded or measured of a dimension that belongs to no arm.
         """
-        layout, encoded = self.layout, np.asarray(action, dtype=np.float64)
         if self._others is None:
             raise RuntimeError("VectorCommander.reset must be called before the first command.")
-        if encoded.shape != (len(layout.encoded_names),):
-            names = ", ".join(layout.encoded_names)
-            raise ShapeError("The policy's action", encoded.shape, f"({len(layout.encoded_names)},): {names}")
-        own, others = layout.split_encoded(encoded)
+        layout = self.layout
+        own, others = self.split_action(action)
         angles, _ = self.split_measured(measured)
-        commands = tuple(arm.command(each, q) for arm, each, q in zip(self.arms, own, angles, strict=True))
+        decoded = ahead or [None] * len(own)
+        parts = zip(self.arms, own, angles, decoded, strict=True)
+        commands = tuple(arm.command(action, q, each) for arm, action, q, each in parts)
         if any(each.stopped for each in commands):
             for arm in self.arms:
                 arm.stop()
@@ -79,6 +82,17 @@ class VectorCommander:
             unknown = ", ".join(name for name, value in values if not np.isfinite(value))
             raise ErIlError(f"Nothing is known of {unknown}: the action is not finite, nor is it measured.")
         return VectorCommand(layout.join([each.q for each in commands], self._others), commands)
+
+    def split_action(self, action: ArrayLike) -> tuple[list[Vector], Vector]:
+        """Split an encoded vector into each arm's action (dim,) and the other dimensions.
+
+        Raises:
+            ShapeError: it has another length.
+        """
+        encoded, names = np.asarray(action, dtype=np.float64), self.layout.encoded_names
+        if encoded.shape != (len(names),):
+            raise ShapeError("The policy's action", encoded.shape, f"({len(names)},): {', '.join(names)}")
+        return self.layout.split_encoded(encoded)
 
     def split_measured(self, measured: ArrayLike) -> tuple[list[Vector], Vector]:
         """Split measured values (D,) into each arm's angles (n,) [rad] and the other dimensions.

@@ -17,6 +17,7 @@ from er_il.arms.arm import Arm
 from er_il.control.commander import BEST_EFFORT, check_answer
 from er_il.envs.contract import check_policy
 from er_il.envs.decoders import NEAREST, Decoder
+from er_il.envs.side_by_side import BATCH_FROM, BatchDecodingEnv
 from er_il.envs.tasks import task_id
 from er_il.envs.wrapper import ActionSpaceEnv, make_action_space_env
 from er_il.spaces.base import ArmSpace
@@ -113,6 +114,8 @@ class ErIlEnvConfig(EnvConfig):
             command = [name for name in sys.modules if name.startswith("lerobot.scripts.")]
             get_context("forkserver").set_forkserver_preload([*command, __name__])
             vector = AsyncVectorEnv(factories, context="forkserver", autoreset_mode=AutoresetMode.NEXT_STEP)
+        elif n_envs >= BATCH_FROM:
+            vector = BatchDecodingEnv(factories)
         else:
             vector = SyncVectorEnv(factories, autoreset_mode=AutoresetMode.NEXT_STEP)
         return {self.type: {0: vector}}

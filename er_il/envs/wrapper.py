@@ -4,10 +4,10 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from er_il.arms.arm import Vector
-from er_il.control.commander import BEST_EFFORT, Tally
+from er_il.control.commander import BEST_EFFORT, DecodedAhead, Tally
 from er_il.control.vector_commander import VectorCommander
 from er_il.envs.decoders import Decoder
 from er_il.envs.protocol import arm_env
@@ -36,6 +36,7 @@ class ActionSpaceEnv(
         self.space = space
         layout = Layout.of_space(space)
         self._commander = VectorCommander(layout, 1.0 / env.metadata["render_fps"], on_invalid)
+        self.ahead: DecodedAhead | None = None  # the next step's action, if it is decoded already
         low, high = (np.append(bound, opening) for bound, opening in zip(space.bounds, (0.0, 1.0), strict=True))
         self.action_space = gymnasium.spaces.Box(low.astype(np.float32), high.astype(np.float32))
 
@@ -47,10 +48,17 @@ class ActionSpaceEnv(
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         observation, info = self.env.reset(seed=seed, options=options)
         self._commander.reset(self._measured())
+        self.ahead = None
         return observation, info
 
+    def query(self, action: ArrayLike) -> tuple[Vector, Vector, Vector]:
+        """The arm's part (dim,) of an action, the measured joints and the last command (n,) [rad] to decode it from."""
+        (own,), _ = self._commander.split_action(action)
+        return own, self.world.joint_positions, self._commander.arms[0].last
+
     def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        commanded = self._commander.command(action, self._measured())
+        ahead, self.ahead = self.ahead, None
+        commanded = self._commander.command(action, self._measured(), ahead and (ahead,))
         (arm,) = commanded.arms
         observation, reward, terminated, truncated, info = self.env.step(commanded.vector.astype(np.float32))
         info = info | {"command": arm.q, "decode_status": str(arm.status), "joint_step": arm.joint_step}

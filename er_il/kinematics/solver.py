@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from er_il.arms.arm import Arm, Vector
 from er_il.kinematics.batch import BatchSearch
-from er_il.kinematics.chain import chunks
+from er_il.kinematics.chain import chunks, to_numpy
 from er_il.kinematics.forward import ForwardKinematics
 from er_il.kinematics.goal import Attempt, Goal
 from er_il.kinematics.redundancy import Array, Redundancy
@@ -50,6 +50,11 @@ class BatchResult:
             np.array([each.pos_err for each in results]),
             np.array([each.rot_err for each in results]),
         )
+
+    def result(self, row: int) -> "IkResult":
+        """The result of one action, as the single solver gives it."""
+        errors = float(self.pos_err[row]), float(self.rot_err[row])
+        return IkResult(to_numpy(self.q[row]), Status(self.status[row]), *errors)
 
 
 @dataclass(frozen=True)
