@@ -4,6 +4,7 @@ import io
 import re
 import resource
 import signal
+import socket
 import subprocess
 import sys
 import urllib.request
@@ -245,6 +246,8 @@ def test_a_served_episode_reaches_the_browser(shown: SimpleNamespace, tmp_path: 
             address = urlsplit(server.stdout.readline().strip())
             with urllib.request.urlopen(f"http://{address.netloc}/") as page:
                 assert b"rerun" in page.read().lower()
+            with pytest.raises(ConnectionRefusedError):  # another address of this machine
+                socket.create_connection(("127.0.0.2", address.port), timeout=5).close()
             assert re.fullmatch(r"rerun\+http://127\.0\.0\.1:\d+/proxy", parse_qs(address.query)["url"][0])
         finally:
             server.send_signal(signal.SIGINT)
@@ -258,6 +261,8 @@ def test_a_served_episode_reaches_the_browser(shown: SimpleNamespace, tmp_path: 
     ("arguments", "message"),
     [
         (["{root}", "--episode", "2", "--save", "{out}/a.rrd"], "has no episode 2. Valid: 0 to 1"),
+        (["{root}", "--serve", "--address", "here"], "'here' is no IP address to listen on. Valid: 127.0.0.1"),
+        (["{root}", "--serve", "--address", "192.0.2.1"], "Cannot listen on 192.0.2.1"),
         (["{root}", "--save", "{out}/a.txt"], "Rerun knows its files by .rrd"),
         (["{root}", "--save", "/dev/null/a.rrd"], "/dev/null"),
         (["{out}", "--save", "{out}/a.rrd"], "{out}"),

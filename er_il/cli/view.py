@@ -13,6 +13,7 @@ def view(
     save: Path | None = None,
     spawn: bool = False,
     serve: bool = False,
+    address: str = "127.0.0.1",
 ) -> None:
     """Show an episode in Rerun: the arm in its world, cameras, curves, and the status of each decode.
 
@@ -25,13 +26,17 @@ def view(
         save: File (.rrd) to write.
         spawn: Open the viewer on this screen.
         serve: Serve a viewer for browsers.
+        address: IP address to serve on. The default is reached from this machine only; anyone who reaches another one
+            sees the episode.
     """
     import time
+    import webbrowser
     from contextlib import suppress
 
     from rich.console import Console
 
-    from er_il.viewer.destination import check_file, require_display
+    from er_il.support.display import has_display
+    from er_il.viewer.destination import check_address, check_file, require_display
     from er_il.viewer.source import read_source
 
     console = Console()
@@ -40,6 +45,7 @@ def view(
         require_display()
     if save:
         check_file(save)
+    check_address(address)
     trace, shapes = read_source(source, episode, arm)
     from er_il.viewer import show  # Rerun: a second of imports
 
@@ -51,7 +57,11 @@ def view(
     if spawn:
         show.spawn(trace, shapes)
     if serve:
-        with suppress(KeyboardInterrupt), show.served(trace, shapes) as address:
-            console.print(f"{address}\nCtrl-C ends it.", highlight=False, soft_wrap=True)
+        from er_il.viewer.server import served
+
+        with suppress(KeyboardInterrupt), served(trace, shapes, address) as url:
+            console.print(f"{url}\nCtrl-C ends it.", highlight=False, soft_wrap=True)
+            if has_display():
+                webbrowser.open(url)
             while True:
                 time.sleep(1)

@@ -1,5 +1,6 @@
 """Destinations that the viewer cannot reach, found before Rerun is imported."""
 
+from ipaddress import ip_address
 from pathlib import Path
 
 from er_il.support.display import has_display
@@ -16,6 +17,21 @@ def check_file(path: Path) -> None:
     """
     if path.suffix != SUFFIX:
         raise ErIlError(f"Rerun knows its files by {SUFFIX}; {path} ends in {path.suffix or 'nothing'}.")
+
+
+def check_address(address: str) -> None:
+    """Refuse to serve where nothing can listen.
+
+    Raises:
+        ErIlError: it is no IP address.
+    """
+    try:
+        ip_address(address)
+    except ValueError as error:
+        raise ErIlError(
+            f"{address!r} is no IP address to listen on. Valid: 127.0.0.1 (this machine only), 0.0.0.0 (every network "
+            "that this machine is in), or one of its own."
+        ) from error
 
 
 def require_display() -> None:

@@ -1,23 +1,15 @@
-"""Destinations of a recording: a file, a viewer on this screen, or a browser."""
+"""Destinations of a recording: a file, or a viewer on this screen."""
 
-import socket
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
-from urllib.parse import quote
-
-import rerun as rr
 
 from er_il.evaluation.trace import Trace
 from er_il.support.atomic_files import write_atomically
-from er_il.support.display import has_display
 from er_il.support.errors import ErIlError
 from er_il.support.shapes import Shape
 from er_il.viewer.destination import check_file
 from er_il.viewer.recording import log_episode, open_recording
 from er_il.viewer.source import shapes_of
-
-GRPC_PORT, WEB_PORT = 9876, 9090  # Rerun's own
 
 
 def save_rollout(trace: Trace, path: Path) -> None:
@@ -47,28 +39,3 @@ def spawn(trace: Trace, shapes: Sequence[Shape]) -> None:
     recording.spawn()
     log_episode(recording, trace, shapes)
     recording.flush()
-
-
-@contextmanager
-def served(trace: Trace, shapes: Sequence[Shape]) -> Iterator[str]:
-    """Serve an episode and a viewer for browsers inside the block; yield the address."""
-    recording = open_recording(trace)
-    uri = recording.serve_grpc(grpc_port=_free(GRPC_PORT))
-    port = _free(WEB_PORT)
-    rr.serve_web_viewer(web_port=port, open_browser=has_display(), connect_to=uri)
-    log_episode(recording, trace, shapes)
-    try:
-        yield f"http://localhost:{port}?url={quote(uri)}"
-    finally:
-        recording.disconnect()
-
-
-def _free(port: int) -> int:
-    """That port, or another one if something listens there."""
-    with socket.socket() as candidate:
-        candidate.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            candidate.bind(("", port))
-        except OSError:
-            candidate.bind(("", 0))
-        return candidate.getsockname()[1]
