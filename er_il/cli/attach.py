@@ -12,6 +12,7 @@ def attach(
     dataset: Path | None = None,
     fps: float | None = None,
     on_invalid: str = "best_effort",
+    trust: bool = False,
 ) -> None:
     """Copy a policy, with a last step that decodes its actions for LeRobot's own lerobot-rollout.
 
@@ -21,9 +22,10 @@ def attach(
         dataset: Dataset that it was trained on; by default where it was then.
         fps: Rate of control [Hz]; the dataset's by default.
         on_invalid: Answer to an invalid action: best_effort, hold or stop.
+        trust: Accept a policy whose processors import what they name: they may run any program.
     """
     from er_il.robots.attachment import attach as write_copy
 
-    step = write_copy(policy, out, dataset=dataset, fps=fps, on_invalid=on_invalid)
+    step = write_copy(policy, out, dataset=dataset, fps=fps, on_invalid=on_invalid, trust=trust)
     print(out)
     print(f"At {1 / step.period:g} Hz it commands {', '.join(step.joint_names)}.")

@@ -14,6 +14,7 @@ def eval(
     seed: int = 1000,
     on_invalid: str = "best_effort",
     out: Path | None = None,
+    trust: bool = False,
 ) -> None:
     """Roll a trained policy out through a decoder, on initial states that no demonstration had.
 
@@ -25,6 +26,7 @@ def eval(
         seed: Seed of the first; the same seeds give every decoder the same initial states.
         on_invalid: What the arm does with an action that cannot be decoded: best_effort, hold, stop.
         out: Folder of report.json and episodes.csv; outputs/eval/<task>/<decoder> if omitted.
+        trust: Let the policy's processors import what they name: they may run any program.
     """
     from rich.console import Console
 
@@ -33,7 +35,8 @@ def eval(
     from er_il.policy.training import pretrained
 
     found = pretrained(policy)
-    check_evaluation(found, task, decoder, episodes, on_invalid)  # seconds of imports follow: mistakes are told before
+    # Seconds of imports follow: mistakes are told before.
+    check_evaluation(found, task, decoder, episodes, on_invalid, trust)
     from er_il.evaluation.results import COUNTS, as_csv, long_form, summarise
     from er_il.evaluation.rollouts import evaluate
     from er_il.support.atomic_files import write_atomically, write_json
@@ -50,6 +53,7 @@ def eval(
             episodes=episodes,
             seed=seed,
             on_invalid=on_invalid,
+            trust=trust,
             advance=lambda count: progress.update(bar, advance=count),
         )
     folder = out or Path("outputs/eval") / task / decoder

@@ -27,6 +27,7 @@ from er_il.datasets.dataset import (
     read_table,
 )
 from er_il.datasets.schema import Feature
+from er_il.support.links import check_links
 
 Stats = dict[str, dict[str, NDArray[Any]]]
 Advance = Callable[[int], object]  # called with the number of frames done since the last call
@@ -68,7 +69,11 @@ def rewrite(
         columns: Columns of the target that the source lacks or has otherwise.
         copies: Columns of the target that the source has under other names.
         advance: Told about progress.
+
+    Raises:
+        ErIlError: a symbolic link leads out of the source.
     """
+    check_links(source.root)
     info = load_info(source.root)
     info.features |= {name: each.feature for name, each in [*columns.items(), *copies.items()]}
     _copy(source.root, target)

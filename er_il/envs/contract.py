@@ -16,6 +16,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
+from er_il.envs.trust import check_steps
 from er_il.kinematics.rotation import Quaternion
 from er_il.spaces.base import ArmSpace
 from er_il.spaces.spec import action_spec
@@ -108,12 +109,19 @@ def policy_contract(policy: str | Path) -> Contract:
     return declared
 
 
-def check_policy(policy: str | Path, space: ArmSpace) -> None:
-    """Refuse a policy whose actions are not those of ``space``.
+def check_policy(policy: str | Path, space: ArmSpace, trust: bool = False) -> None:
+    """Refuse a policy whose actions are not those of ``space``, or that makes LeRobot execute what it names.
+
+    Args:
+        policy: Folder of a pretrained policy, or its Hub id.
+        space: The action space.
+        trust: Accept processors with steps that are imported by their class: :mod:`er_il.envs.trust`.
 
     Raises:
-        PolicyError: it was trained for something else, and says what differs; or decodes by itself.
+        PolicyError: it was trained for something else, and says what differs; decodes by itself; or is not trusted.
     """
+    if not trust:
+        check_steps(policy)
     if decodes(policy):
         raise PolicyError(
             f"The policy {policy} decodes its actions by itself, for a robot (er-il attach). "

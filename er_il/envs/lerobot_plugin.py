@@ -42,6 +42,7 @@ class ErIlEnvConfig(EnvConfig):
         visualization_width: Width of the stock commands' films [px], which LeRobot holds in memory twice until all
             are written.
         visualization_height: Height of these [px].
+        trust: Accept a policy whose processors import what they name (:mod:`er_il.envs.trust`).
     """
 
     task: str | None = "reach_cup"
@@ -56,6 +57,7 @@ class ErIlEnvConfig(EnvConfig):
     image_size: int = 96
     visualization_width: int = 320
     visualization_height: int = 240
+    trust: bool = False
 
     def __post_init__(self) -> None:
         check_answer(self.on_invalid)
@@ -103,7 +105,7 @@ class ErIlEnvConfig(EnvConfig):
         # LeRobot's own commands tell an environment nothing about the policy it will meet, but
         # the last chance to refuse a wrong one is here.
         if policy := parser.get_path_arg("policy"):
-            check_policy(policy, self.space)
+            check_policy(policy, self.space, self.trust)
         # An episode that has ended waits for the batch's slowest; without the freeze its successor's
         # first steps would count into its metrics.
         factories = [freeze_after_episode_end(self._maker)] * n_envs

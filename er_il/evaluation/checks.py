@@ -10,11 +10,11 @@ from er_il.envs.tasks import task_id
 from er_il.support.errors import ErIlError
 
 
-def check_evaluation(policy: Path, task: str, decoder_name: str, episodes: int, on_invalid: str) -> None:
+def check_evaluation(policy: Path, task: str, decoder_name: str, episodes: int, on_invalid: str, trust: bool) -> None:
     """Refuse what :func:`er_il.evaluation.rollouts.evaluate` cannot do; the arguments are its own.
 
     Raises:
-        PolicyError: the policy is missing, or was trained for another action space.
+        PolicyError: the policy is missing, was trained for another action space, or is not trusted.
         UnknownNameError: no such task, decoder, or answer to invalid actions.
         ErIlError: no episodes.
     """
@@ -23,4 +23,4 @@ def check_evaluation(policy: Path, task: str, decoder_name: str, episodes: int, 
     task_id(task)
     check_answer(on_invalid)
     chosen, contract = decoder(decoder_name), policy_contract(policy)
-    check_policy(policy, chosen.space_of(Arm.preset(contract.arm), contract.rotation_code))
+    check_policy(policy, chosen.space_of(Arm.preset(contract.arm), contract.rotation_code), trust)

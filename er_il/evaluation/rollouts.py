@@ -29,6 +29,7 @@ def evaluate(
     posture: Sequence[float] = (),
     elbow: ElbowReference | None = None,
     batch_size: int = POLICY_ROWS,
+    trust: bool = False,
     advance: Callable[[int], None] = lambda episodes: None,
 ) -> list[Rollout]:
     """Roll a policy out on the seeds ``seed, seed + 1, ...``.
@@ -44,6 +45,7 @@ def evaluate(
         elbow: What to measure the elbow against, if anything.
         batch_size: Environments side by side, up to ``POLICY_ROWS``; it changes no result, unless the policy
             draws random numbers, as Diffusion does.
+        trust: See :func:`er_il.envs.contract.check_policy`.
         advance: Called with the number of rollouts just finished.
 
     Raises:
@@ -51,7 +53,7 @@ def evaluate(
         UnknownNameError: no such task or decoder.
         ErIlError: no episodes.
     """
-    check_evaluation(policy, task, decoder_name, episodes, on_invalid)
+    check_evaluation(policy, task, decoder_name, episodes, on_invalid, trust)
     if not 1 <= batch_size <= POLICY_ROWS:
         raise ErIlError(f"The batch size is {batch_size}; it must be between 1 and {POLICY_ROWS}.")
     config = environment_of(policy, task, decoder_name, on_invalid, posture)

@@ -14,18 +14,26 @@ from er_il.control.commander import BEST_EFFORT
 from er_il.datasets.dataset import Dataset
 from er_il.datasets.schema import STATE
 from er_il.envs.contract import decodes
+from er_il.envs.trust import check_steps
 from er_il.policy.training import pretrained
 from er_il.robots.robot_commander import RobotCommander
 from er_il.spaces.spec import ACTION
 from er_il.support.atomic_files import check_absent
 from er_il.support.errors import ErIlError, PolicyError, ShapeError
+from er_il.support.links import check_links
 
 if TYPE_CHECKING:
     from er_il.robots.processors import DecodePolicyAction
 
 
 def attach(
-    policy: Path, out: Path, *, dataset: Path | None = None, fps: float | None = None, on_invalid: str = BEST_EFFORT
+    policy: Path,
+    out: Path,
+    *,
+    dataset: Path | None = None,
+    fps: float | None = None,
+    on_invalid: str = BEST_EFFORT,
+    trust: bool = False,
 ) -> "DecodePolicyAction":
     """Write a copy of a policy that decodes its own actions to joint vectors.
 
@@ -38,18 +46,22 @@ def attach(
         dataset: The dataset that the policy was trained on; by default where it was then.
         fps: Rate of control [Hz]; the dataset's by default.
         on_invalid: The answer to an invalid action.
+        trust: Accept a policy whose processors import what they name (:mod:`er_il.envs.trust`).
 
     Returns:
         The step that decodes.
 
     Raises:
-        PolicyError: there is no policy, it decodes already, or it does not say where its dataset is.
+        PolicyError: there is no policy, it decodes already, is not trusted, or does not say where its dataset is.
         DatasetError: there is no dataset, or it does not say what its actions mean.
         ShapeError: the policy was not trained on this dataset.
         ErIlError: the rate is not positive, or there is no such answer to invalid actions.
         FileExistsError: ``out`` exists.
     """
     source = pretrained(policy)
+    check_links(source)
+    if not trust:
+        check_steps(source)
     if decodes(source):
         raise PolicyError(f"The policy {source} decodes its actions already.")
     trained_on = Dataset(dataset or _trained_on(source))

@@ -1,0 +1,56 @@
+"""Policies from others are data: what of a policy LeRobot would execute is refused before LeRobot sees it.
+
+LeRobot 0.6.1 imports and calls whatever a processor file names as the ``class`` of a step
+(``DataProcessorPipeline._resolve_step_class``). Steps by their registered names come from installed packages alone.
+"""
+
+import json
+from pathlib import Path
+
+from er_il.support.errors import PolicyError
+
+PROCESSORS = ("policy_preprocessor.json", "policy_postprocessor.json")
+
+
+def check_steps(policy: str | Path) -> None:
+    """Refuse a policy whose processors have a step that is not named by its registered name.
+
+    Args:
+        policy: Folder of a pretrained policy, or its Hub id.
+
+    Raises:
+        PolicyError: there is such a step, or a processor file cannot be read.
+    """
+    for name in PROCESSORS:
+        file = _file(policy, name)
+        if file is None:
+            continue  # LeRobot loads none, or says what it misses
+        try:
+            steps: list[dict[str, object]] = json.loads(file.read_text())["steps"]
+            if not isinstance(steps, list):
+                raise TypeError("its steps are no list")
+            named = [(step.get("registry_name"), step.get("class")) for step in steps]
+        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+            raise PolicyError(f"{file} describes no processor: {error}.") from error
+        for registered, imported in named:
+            if imported is not None or not isinstance(registered, str):
+                raise PolicyError(
+                    f"{file} asks LeRobot to import and call {imported!r}, which may be any program. "
+                    "If you trust where the policy comes from: --trust (lerobot-eval: --env.trust=true)."
+                )
+
+
+def _file(policy: str | Path, name: str) -> Path | None:
+    """A file of a policy; None if the policy has none of that name."""
+    if Path(policy).is_dir():
+        file = Path(policy) / name
+        return file if file.exists() else None
+    from huggingface_hub import hf_hub_download
+    from huggingface_hub.errors import EntryNotFoundError
+
+    try:
+        return Path(hf_hub_download(str(policy), name))  # the file that LeRobot will find in the cache
+    except EntryNotFoundError:
+        return None
+    except (OSError, ValueError) as error:  # huggingface_hub's errors derive from these
+        raise PolicyError(f"No policy at {policy}: {str(error).splitlines()[0]}") from error
