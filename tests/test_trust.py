@@ -42,10 +42,9 @@ def test_a_policy_that_names_a_class_to_import_is_not_loaded(
             run("er-il", *command)
         error = " ".join(capsys.readouterr().err.split())
         assert "asks LeRobot to import and call 'subprocess.Popen'" in error and "--trust" in error
-    evaluating = ErIlEnvConfig(
-        task="push_button_elbow", action_space="erj"
-    )  # in lerobot-eval, before it loads the policy
-    with pytest.raises(PolicyError, match="--env.trust=true"):
+    # lerobot-eval makes the environments before it loads the policy.
+    evaluating = ErIlEnvConfig(task="push_button_elbow", action_space="erj")
+    with pytest.raises(PolicyError, match=r"--env.trust=true"):
         check_policy(policy, evaluating.space, evaluating.trust)
     check_policy(policy, evaluating.space, trust=True)
     assert not (tmp_path / "executed").exists() and not (tmp_path / "out").exists()

@@ -253,6 +253,8 @@ def test_a_served_episode_reaches_the_browser(shown: SimpleNamespace, tmp_path: 
             server.send_signal(signal.SIGINT)
         try:
             assert server.wait(timeout=60) == 0
+            with pytest.raises(ConnectionRefusedError):  # nothing is left behind
+                socket.create_connection(("127.0.0.1", address.port or 0), timeout=5).close()
         finally:
             server.kill()  # else the block would wait for it
 

@@ -1,5 +1,7 @@
 """Rerun's server of an episode for browsers: on this machine alone, unless another address is asked for."""
 
+import os
+import signal
 import socket
 import subprocess
 import sys
@@ -38,14 +40,18 @@ def served(trace: Trace, shapes: Sequence[Shape], address: str) -> Iterator[str]
         save_recording(trace, shapes, file)
         ports = _free(GRPC_PORT, address), _free(WEB_PORT, address)
         # The SDK's servers listen on every address of the machine; only Rerun's program can be told otherwise.
-        command = [sys.executable, "-m", "rerun", str(file), "--serve-web", "--bind", address]
+        command = [sys.executable, "-m", "rerun_cli", str(file), "--serve-web", "--bind", address]
         command += ["--port", str(ports[0]), "--web-viewer-port", str(ports[1])]
-        with log.open("wb") as output, subprocess.Popen(command, stdout=output, stderr=output) as server:
+        with (
+            log.open("wb") as output,
+            # A session of its own: the module starts the program as another process, which must end, too.
+            subprocess.Popen(command, stdout=output, stderr=output, start_new_session=True) as server,
+        ):
             try:
                 _wait(server, address, ports, log)
                 yield f"http://{_written(host)}:{ports[1]}?url={quote(f'rerun+http://{_written(host)}:{ports[0]}/proxy')}"
             finally:
-                server.terminate()
+                os.killpg(server.pid, signal.SIGTERM)
 
 
 def _wait(server: "subprocess.Popen[bytes]", address: str, ports: Sequence[int], log: Path) -> None:
