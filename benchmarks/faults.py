@@ -1,0 +1,134 @@
+"""A fault programme: kills, damaged inputs, and actions that mean nothing.
+
+    uv run python benchmarks/faults.py  # results/faults/report.json
+
+Commands are killed at moments spread over their time and run again; inputs are damaged by drawn mutations; commanders
+and environments are given actions that no policy should predict. The report counts what was not as it is promised: a
+run that was resumed gives what an undisturbed one gives, damage is told in a line, no command leaves the arm's limits.
+An hour on two cores.
+"""
+
+import os
+import shutil
+from collections.abc import Callable
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import tyro
+import yaml
+from fault_actions import fuzz_commanders, fuzz_environments
+from fault_inputs import TRIALS, try_damaged
+from fault_kills import commands, kill_often
+from faulty import preloaded
+from lerobot.datasets import LeRobotDataset
+from rich.progress import Progress
+
+from er_il.arms.arm import Arm
+from er_il.arms.urdf import example_robot_data
+from er_il.datasets.dataset import Dataset
+from er_il.datasets.recipe import Recipe
+from er_il.datasets.recording import generate
+from er_il.experiments.grid import Grid
+from er_il.experiments.plan import Plan
+from er_il.policy.configuration import default_config
+from er_il.policy.training import Training
+from er_il.support.atomic_files import write_json
+from er_il.support.provenance import provenance
+from er_il.support.workers import ONE_THREAD, cores
+
+TASK = "push_button_elbow"  # its demonstrations are the shortest
+
+
+def prepare(data: Path) -> None:
+    """Write what the commands read: demonstrations encoded and plain, a policy, a robot, a grid and another one."""
+    recipe = Recipe.load(TASK).resized(3)
+    made = generate(recipe, ["joint", "erj"], data / "demos", Progress(disable=True), workers=1)
+    shutil.copytree(made.paths["erj"], data / "erj")
+    _write_plain(Dataset(made.paths["joint"]), data / "plain")
+    training = Training(TASK, "erj", data / "erj", data / "training", default_config("erj"), 2, seed=0)
+    with (data / "training.txt").open("w") as log:
+        if code := training.run(log):
+            raise RuntimeError(f"The training ended with exit code {code}.")
+    shutil.copytree(training.policy, data / "policy")
+    (data / "robot").mkdir()
+    shutil.copy(example_robot_data("panda_description/urdf/panda.urdf"), data / "robot/arm.urdf")
+    joints = [f"{joint}.pos" for joint in Arm.preset("panda").joints]
+    wiring = {"only": {"arm": "arm.urdf", "ee_frame": "panda_hand_tcp", "joints": joints, "signs": [1] * len(joints)}}
+    (data / "robot/arms.yaml").write_text(yaml.safe_dump(wiring))
+    (data / "grid").mkdir()
+    shutil.copy(Path(__file__).parents[1] / "configs/table1.yaml", data / "grid/grid.yaml")
+    # Of another grid: whatever is read, nothing is computed.
+    other = Grid.from_dict({**Grid.from_file(data / "grid/grid.yaml").to_dict(), "rollouts": 7})
+    with Plan(other, data / "other_grid").claimed():
+        pass
+
+
+def _write_plain(source: Dataset, root: Path) -> None:
+    """Write demonstrations in joint space as LeRobot records them, without a word about the arm."""
+    names = [*(f"{joint}.pos" for joint in Arm.preset("panda").joints), "gripper.pos"]
+    feature = {"dtype": "float32", "shape": (len(names),), "names": names}
+    plain = LeRobotDataset.create(
+        "er_il/plain", int(source.fps), {"action": feature, "observation.state": feature}, root=root, use_videos=False
+    )
+    actions, states = source.vectors("action"), source.vectors("observation.state")[:, : len(names)]
+    for rows in source.episodes.values():
+        for action, state in zip(actions[rows], states[rows], strict=True):
+            plain.add_frame({"action": action, "observation.state": state, "task": "Push the button."})
+        plain.save_episode()
+    plain.finalize()
+
+
+def main(
+    kills: int = 100,
+    damages: int = 1000,
+    actions: int = 1_000_000,
+    steps: int = 100_000,
+    seed: int = 0,
+    out: Path = Path("results/faults"),
+) -> None:
+    """Run the programme; write the report.
+
+    Args:
+        kills: Number of kills, over all commands.
+        damages: Number of damaged inputs, over all commands.
+        actions: Number of actions for commanders.
+        steps: Number of actions for environments.
+        seed: Seed of everything that is drawn.
+        out: Folder of the report.
+    """
+    os.environ |= ONE_THREAD
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        prepare(data := folder / "data")
+        jobs: list[tuple[str, Callable[..., Any], tuple[Any, ...]]] = []
+        planned, parts = commands(data), cores()
+        total = sum(command.share for command in planned)
+        for index, command in enumerate(planned):
+            count = max(1, round(kills * command.share / total))
+            jobs.append(("kills", kill_often, (index, count, seed, data, folder / f"kills_{index}")))
+        for index in range(len(TRIALS)):
+            count = damages // len(TRIALS) + (index < damages % len(TRIALS))
+            jobs.append(("inputs", try_damaged, (index, max(1, count), seed, data, folder / f"inputs_{index}")))
+        for part in range(parts):
+            jobs.append(("commands", fuzz_commanders, (-(-actions // parts), seed + part)))
+            jobs.append(("environments", fuzz_environments, (-(-steps // parts), seed + part)))
+        rows: dict[str, list[Any]] = {kind: [] for kind, *_ in jobs}
+        with Progress() as progress, ProcessPoolExecutor(parts, mp_context=preloaded()) as executor:
+            bar = progress.add_task("Faults", total=len(jobs))
+            running: dict[Future[Any], str] = {
+                executor.submit(function, *arguments): kind for kind, function, arguments in jobs
+            }
+            for future in as_completed(running):
+                rows[running[future]].append(future.result())
+                progress.advance(bar)
+    meta = provenance() | {"seed": seed, "task": TASK}
+    write_json(out / "report.json", {"meta": meta, **rows})
+    for row in (*rows["kills"], *rows["inputs"]):
+        for fault in row["faults"]:
+            print(row["command"], fault)
+
+
+if __name__ == "__main__":
+    tyro.cli(main)
