@@ -31,7 +31,10 @@ def eval(
     from er_il.cli.progress import make_progress
     from er_il.evaluation.checks import check_evaluation
     from er_il.policy.training import pretrained
+    from er_il.support.atomic_files import check_writable
 
+    folder = out or Path("outputs/eval") / task / decoder
+    check_writable(folder)
     found = pretrained(policy)
     check_evaluation(found, task, decoder, episodes, on_invalid)  # seconds of imports follow: mistakes are told before
     from er_il.evaluation.results import COUNTS, as_csv, long_form, summarise
@@ -52,7 +55,6 @@ def eval(
             on_invalid=on_invalid,
             advance=lambda count: progress.update(bar, advance=count),
         )
-    folder = out or Path("outputs/eval") / task / decoder
     meta = provenance() | {"policy": str(policy), "first_seed": seed, "episodes": episodes, "on_invalid": on_invalid}
     rollouts = long_form([({"task": task, "decoder": decoder}, done)])
     report = summarise(rollouts)

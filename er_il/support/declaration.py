@@ -110,19 +110,19 @@ def _more_values_than(values: object, most: int) -> bool:
     return count > most
 
 
-def check_values(kind: type[BaseModel], values: Any, path: Path, error: type[ErIlError]) -> None:
+def check_values(kind: type[BaseModel], values: object, what: object, error: type[ErIlError]) -> None:
     """Check what a file of others says against the class that describes what er_il needs of it.
 
     Args:
         kind: The class.
         values: What the file said.
-        path: The file.
+        what: The file's path, or what else to call it.
         error: What to raise if it says something else; names the file and what is wrong.
     """
     try:
         kind.model_validate(values)
     except ValidationError as cause:
-        raise error(f"{path} is damaged: {_message(cause, 'file', kind.model_fields)}") from cause
+        raise error(f"{what} is damaged: {_message(cause, 'file', kind.model_fields)}") from cause
 
 
 def _message(cause: ValidationError, noun: str, valid: Mapping[str, Any]) -> str:

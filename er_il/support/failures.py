@@ -4,7 +4,7 @@ import os
 
 from er_il.support.errors import ErIlError
 
-REPORT = "This looks like a bug of er_il: please report it on its issues page, with these lines and what `er-il doctor` says."
+REPORT = "This looks like a bug of er_il: please report it on its issues page, with these lines and `er-il doctor`'s."
 
 # Exceptions by module and name, since importing what defines them takes seconds, and what has not been imported has
 # raised nothing. Only those that speak of data: a KeyError or a TypeError may be our own mistake.
