@@ -7,15 +7,16 @@ from pydantic import BaseModel, Field, StrictFloat, StrictInt, StrictStr, model_
 
 from er_il.spaces.spec import ACTION
 
+Name = StrictStr | StrictInt
 Positive = Annotated[StrictInt, Field(ge=1)]
 
 
 class FeatureInfo(BaseModel):
     """A column; its names are a list, or a mapping of lists or numbers in older datasets."""
 
-    dtype: StrictStr
+    dtype: Annotated[StrictStr, Field(pattern=r"^(video|image|string|language|bool|u?int\d+|float\d+)$")]
     shape: Annotated[tuple[Positive, ...], Field(min_length=1)]
-    names: list[Any] | Mapping[StrictStr, list[Any] | StrictInt] | None = None
+    names: list[Name] | Mapping[StrictStr, list[Name] | StrictInt] | None = None
     info: Mapping[StrictStr, Any] | None = None
 
 

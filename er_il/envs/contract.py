@@ -19,7 +19,7 @@ from pydantic import BaseModel, Field, StrictInt, StrictStr
 
 from er_il.kinematics.rotation import Quaternion
 from er_il.spaces.base import ArmSpace
-from er_il.spaces.spec import ACTION, action_spec
+from er_il.spaces.spec import action_spec
 from er_il.support.declaration import check_values
 from er_il.support.errors import DatasetError, PolicyError
 from er_il.support.json_files import read_json
@@ -134,8 +134,8 @@ class _PolicyConfig(BaseModel):
     """What er_il needs of a policy's configuration."""
 
     type: StrictStr
-    input_features: dict[StrictStr, _Shaped]
-    output_features: dict[StrictStr, _Shaped]
+    input_features: dict[StrictStr, _Shaped] | None = None
+    output_features: dict[StrictStr, _Shaped] | None = None
     tags: list[StrictStr] | None = None
 
 
@@ -149,13 +149,11 @@ def read_policy_config(policy: Path) -> dict[str, Any]:
     """Read the ``config.json`` of a policy in a folder.
 
     Raises:
-        PolicyError: it is missing or damaged, or has no action.
+        PolicyError: it is missing or damaged.
     """
     path = policy / "config.json"
     config = read_json(path, PolicyError)
     check_values(_PolicyConfig, config, path, PolicyError)
-    if ACTION not in config["output_features"]:
-        raise PolicyError(f"{path} is damaged: the policy has no {ACTION} among its output_features.")
     return config
 
 

@@ -31,15 +31,15 @@ class _Policy(BaseModel):
 class _Configuration(BaseModel):
     """What er_il needs of a configuration; LeRobot reads, and checks, the rest."""
 
-    steps: Annotated[StrictInt, Field(ge=1)]
-    policy: _Policy = _Policy()
+    steps: Annotated[StrictInt, Field(ge=1)] | None = None
+    policy: _Policy | None = None
 
 
 def read_config(config: Path) -> dict[str, Any]:
     """Read a training configuration.
 
     Raises:
-        PolicyError: it is missing, damaged, or does not say how many steps to take.
+        PolicyError: it is missing or damaged.
     """
     values = read_yaml(config, "training configuration", PolicyError)
     check_values(_Configuration, values, config, PolicyError)
@@ -48,8 +48,15 @@ def read_config(config: Path) -> dict[str, Any]:
 
 
 def default_steps(config: Path) -> int:
-    """Return the number of steps that a configuration asks for; see :func:`read_config`."""
-    return read_config(config)["steps"]
+    """Return the number of steps that a configuration asks for.
+
+    Raises:
+        PolicyError: the configuration is missing or damaged, or does not say.
+    """
+    steps = read_config(config).get("steps")
+    if steps is None:
+        raise PolicyError(f"{config} does not say how many steps to take.")
+    return steps
 
 
 def input_features(config: Path, features: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
@@ -81,4 +88,4 @@ def input_features(config: Path, features: Mapping[str, Any]) -> dict[str, dict[
 
 def named_inputs(config: Path) -> dict[str, dict[str, Any]]:
     """The inputs that a configuration names; empty if it leaves them to LeRobot."""
-    return read_config(config).get("policy", {}).get("input_features") or {}
+    return (read_config(config).get("policy") or {}).get("input_features") or {}

@@ -74,6 +74,9 @@ def _trained_on(policy: Path) -> Path:
 
 
 def _check_shape(policy: Path, needed: tuple[int, ...]) -> None:
-    shape = read_policy_config(policy)["output_features"][ACTION]["shape"]
+    outputs = read_policy_config(policy).get("output_features") or {}
+    if ACTION not in outputs:
+        raise PolicyError(f"{policy / 'config.json'} is damaged: the policy has no {ACTION} among its output_features.")
+    shape = outputs[ACTION]["shape"]
     if tuple(shape) != tuple(needed):
         raise ShapeError("The policy's action", tuple(shape), f"{tuple(needed)} as in the dataset")
