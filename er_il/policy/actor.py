@@ -9,10 +9,12 @@ from typing import Any
 
 import numpy as np
 import torch
+from huggingface_hub.constants import SAFETENSORS_SINGLE_FILE
 from lerobot.configs import PreTrainedConfig
 from lerobot.envs import preprocess_observation
 from lerobot.policies import PreTrainedPolicy, make_policy, make_pre_post_processors
 from lerobot.utils.constants import OBS_IMAGES
+from safetensors.torch import load_model
 from threadpoolctl import threadpool_limits
 
 from er_il.control.commander import BEST_EFFORT
@@ -71,6 +73,14 @@ def _loading(policy: Path) -> Iterator[None]:
         raise PolicyError(f"LeRobot cannot load the policy {policy} ({type(error).__name__}): {said}") from error
 
 
+def _check_weights(policy: PreTrainedPolicy, path: Path) -> None:
+    """Raise a RuntimeError where the file of the weights is not of this policy: LeRobot leaves what it lacks random."""
+    own = type(policy)
+    loads_as_others = own.from_pretrained.__func__ is PreTrainedPolicy.from_pretrained.__func__
+    if loads_as_others and (weights := path / SAFETENSORS_SINGLE_FILE).is_file():
+        load_model(policy, weights, strict=True)
+
+
 def _load_config(policy: Path) -> PreTrainedConfig:
     with _loading(policy):
         config = PreTrainedConfig.from_pretrained(policy)
@@ -98,6 +108,7 @@ class Actor:
             )
         with _loading(path), redirect_stdout(io.StringIO()):  # LeRobot announces every file it loads
             policy = make_policy(policy_config, env_cfg=config)
+            _check_weights(policy, path)
         policy.eval()
         overrides = {"device_processor": {"device": str(policy.config.device)}}
         with _loading(path):
