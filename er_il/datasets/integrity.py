@@ -1,6 +1,7 @@
 """What else than actions a LeRobot v3 dataset needs to be whole: episodes, tasks, statistics and videos."""
 
 from collections.abc import Iterator
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -133,9 +134,13 @@ def _check_video(path: Path, end: float, fps: float) -> None:
     length = 0.0
     try:
         with av.open(str(path)) as container:
-            for stream in container.streams.video:
-                length = max(length, float((stream.duration or 0) * (stream.time_base or 0)))
-    except (FFmpegError, OSError) as error:
+            stream = container.streams.video[0]
+            unit = stream.time_base or Fraction(1, 1)
+            container.seek(int(end / unit), stream=stream)  # to the last picture that stands for itself
+            for packet in container.demux(stream):  # the header's duration is there in a truncated file, too
+                if packet.size and packet.pts is not None and not packet.is_corrupt:
+                    length = max(length, float((packet.pts + (packet.duration or 0)) * unit))
+    except (FFmpegError, OSError, IndexError) as error:
         raise DatasetError(f"The video {path} is damaged: {' '.join(str(error).split())}.") from error
     if length < end - _SHORT / fps:
         raise DatasetError(f"The video {path} is damaged: it lasts {length:.2f} s, its episodes end at {end:.2f} s.")
