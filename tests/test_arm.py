@@ -106,7 +106,10 @@ def test_what_does_not_fit_the_file_is_refused_with_what_would(tmp_path, argumen
 
 def test_joints_need_a_range_and_a_speed(tmp_path):
     for name, arguments in [("still", {"velocity": 0.0}), ("narrow", {"limits": (1.0, 1.0)})]:
-        with pytest.raises(ArmError, match=r"\.urdf: every arm joint needs lower < upper and a velocity limit > 0"):
+        with pytest.raises(
+            ArmError,
+            match=r"\.urdf: the joint j1 is limited to .*: every arm joint needs lower < upper, .* velocity limit > 0",
+        ):
             Arm.from_urdf(write_chain(tmp_path / f"{name}.urdf", 7, **arguments), ee_frame="tool")
 
 

@@ -179,7 +179,7 @@ def test_training_reports_are_read_and_others_refused(tmp_path):
     assert [cell["decoder"] for cell in read_training(path)] == ["erj", "erj@j2", "erj@j3"]
     for text in ("{}", "[]", "no json", '{"cells": [{"task": "reach"}]}'):
         path.write_text(text)
-        with pytest.raises(DatasetError, match="is no report of rollouts"):
+        with pytest.raises(DatasetError, match=r"results\.json is damaged"):
             read_training(path)
     with pytest.raises(DatasetError, match="There is no"):
         read_training(tmp_path / "absent.json")

@@ -180,7 +180,7 @@ def test_a_checkpoint_cut_off_while_it_was_written_is_not_resumed(datasets: Path
 def test_mistakes(datasets: Path, tmp_path: Path):
     with pytest.raises(UnknownNameError, match="joint, task, erj"):
         training(datasets, tmp_path, space="jiont")
-    with pytest.raises(DatasetError, match="No dataset at"):
+    with pytest.raises(DatasetError, match=r"none is not a LeRobot v3 dataset: it has no meta/info\.json"):
         training(datasets, tmp_path, dataset=tmp_path / "none")
     with pytest.raises(DatasetError, match="holds joint actions, not erj"):
         training(datasets, tmp_path, dataset=datasets / "joint")
@@ -197,7 +197,7 @@ def test_mistakes(datasets: Path, tmp_path: Path):
     [
         (["train", "reach_cap", "erj"], "Unknown task 'reach_cap'. Valid: lift_cup, "),
         (["train", "reach_cup", "ejr"], "Unknown action space 'ejr'."),
-        (["train", "reach_cup", "erj", "--dataset", "nowhere"], "No dataset at nowhere"),
+        (["train", "reach_cup", "erj", "--dataset", "nowhere"], "nowhere is not a LeRobot v3 dataset"),
         (["eval", "nowhere", "--task", "reach_cup", "--decoder", "erj"], "No policy at nowhere"),
     ],
 )

@@ -1,7 +1,6 @@
 """The arm: which joints of which URDF, between which frames, within which limits."""
 
 import hashlib
-import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
@@ -12,7 +11,8 @@ import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy.typing import ArrayLike, NDArray
 
 from er_il.arms.presets import PRESETS
-from er_il.arms.urdf import kinematic_xml, only_tip, pinocchio_model
+from er_il.arms.robot_tree import RobotTree
+from er_il.arms.urdf import parse_urdf, pinocchio_model
 from er_il.support.errors import ArmError, UnknownNameError
 
 Vector = NDArray[np.float64]
@@ -72,7 +72,7 @@ class Arm:
     ) -> "Arm":
         """Read an arm from a URDF file.
 
-        Continuous joints get limits of one turn to either side (see :mod:`er_il.arms.urdf`).
+        Continuous joints get limits of one turn to either side (see :mod:`er_il.arms.robot_tree`).
 
         Args:
             urdf: Path of the file. Meshes are not read.
@@ -91,18 +91,18 @@ class Arm:
             ArmError: the file is unreadable, or joints, frames and limits do not fit together.
         """
         path = Path(urdf)
-        xml = kinematic_xml(path)
-        model = pinocchio_model(xml, path.name)
-        links = [frame.name for frame in model.frames if frame.type == pin.FrameType.BODY]
-        base = base_frame if base_frame is not None else links[0]
-        ee = ee_frame if ee_frame is not None else only_tip(xml, path.name)
+        tree = RobotTree.of_element(parse_urdf(path), path.name)
+        base = base_frame if base_frame is not None else tree.root
+        ee = ee_frame if ee_frame is not None else _only_tip(tree)
         for role, frame in [("base frame", base), ("end-effector frame", ee)]:
-            if frame not in links:
-                raise ArmError(f"{path.name} has no {role} {frame!r}. Its links: {', '.join(links)}.")
-        chain = _chain(model, base, ee)
+            if frame not in tree.links:
+                raise ArmError(f"{path.name} has no {role} {frame!r}. Its links: {', '.join(tree.links)}.")
+        chain = tuple(joint.name for joint in tree.chain(base, ee))
         if not chain:
             raise ArmError(f"No movable joint lies between {base!r} and {ee!r} in {path.name}.")
         chosen = tuple(joints) if joints is not None else chain
+        if not chosen:
+            raise ArmError(f"No joint of {path.name} is chosen. Movable joints: {', '.join(chain)}.")
         if len(set(chosen)) != len(chosen):
             raise ArmError(f"A joint is named twice in {', '.join(chosen)}.")
         if strangers := [joint for joint in chosen if joint not in chain]:
@@ -110,14 +110,18 @@ class Arm:
                 f"{', '.join(strangers)}: not between {base!r} and {ee!r} in {path.name}. "
                 f"Movable joints there: {', '.join(chain)}."
             )
+        if followers := [joint.name for joint in tree.chain(base, ee) if joint.element.find("mimic") is not None]:
+            raise ArmError(
+                f"{path.name}: {', '.join(followers)} mimic other joints on the way to {ee!r}; er_il commands each "
+                "joint of an arm by itself."
+            )
+        model = pinocchio_model(tree.arm_xml(chosen), path.name)
         index = [model.joints[model.getJointId(joint)].idx_q for joint in chosen]
         lower, upper = model.lowerPositionLimit[index], model.upperPositionLimit[index]
         velocity = model.velocityLimit[index]
-        if not (np.all(upper > lower) and np.all(velocity > 0)):
-            raise ArmError(f"{path.name}: every arm joint needs lower < upper and a velocity limit > 0.")
         spare = max(0, len(chosen) - POSE_DOF)
         arm = cls(
-            name=name or _robot_name(xml),
+            name=name or tree.name,
             urdf=path.resolve(),
             joints=chosen,
             base_frame=base,
@@ -127,9 +131,9 @@ class Arm:
             velocity=_frozen(velocity),
             redundant=tuple(redundant) if redundant is not None else chosen[:spare],
             home=_frozen((lower + upper) / 2 if home is None else home),
-            angle_frames=angle_frames or _angle_frames(model, [joint for joint in chain if joint in chosen]),
+            angle_frames=angle_frames or _angle_frames(tree, [joint for joint in chain if joint in chosen]),
         )
-        arm._check(links)
+        arm._check(tree.links)
         return arm
 
     def within_limits(self, q: Vector) -> Vector:
@@ -145,9 +149,9 @@ class Arm:
                 f"not {len(self.redundant)} ({', '.join(self.redundant)})."
             )
 
-    def _check(self, links: list[str]) -> None:
+    def _check(self, links: Sequence[str]) -> None:
         self._check_redundant()
-        if self.home.shape != (self.dof,) or np.any(self.home < self.lower) or np.any(self.home > self.upper):
+        if self.home.shape != (self.dof,) or not np.all((self.lower <= self.home) & (self.home <= self.upper)):
             raise ArmError(f"The home posture of {self.name} needs {self.dof} angles within the joint limits.")
         if self.angle_frames is not None:
             frames = self.angle_frames
@@ -179,7 +183,7 @@ class Arm:
     @cached_property
     def model_xml(self) -> str:
         """The URDF without meshes, every joint outside the arm fixed at zero."""
-        return kinematic_xml(self.urdf, movable=self.joints)
+        return RobotTree.of_element(parse_urdf(self.urdf), self.urdf.name).arm_xml(self.joints)
 
     @cached_property
     def fingerprint(self) -> str:
@@ -215,28 +219,20 @@ def _frozen(values: ArrayLike) -> Vector:
     return array
 
 
-def _robot_name(xml: str) -> str:
-    return ET.fromstring(xml).get("name", "arm")
+def _only_tip(tree: RobotTree) -> str:
+    """The link at the end of a tree that has one branch only."""
+    if len(tree.tips) != 1:
+        raise ArmError(
+            f"{tree.file} ends in several links, so name the end-effector frame, such as {', '.join(tree.tips)}."
+        )
+    return tree.tips[0]
 
 
-def _angle_frames(model: pin.Model, joints: Sequence[str]) -> ArmAngleFrames | None:
+def _angle_frames(tree: RobotTree, joints: Sequence[str]) -> ArmAngleFrames | None:
     """The links at which an arm with seven joints bends; None for other arms, which ERA does not describe."""
     if len(joints) != POSE_DOF + 1:
         return None
-    bends = [model.getJointId(joints[i]) for i in (1, 3, 5)]
-    return ArmAngleFrames(*(_first_link(model, joint) for joint in bends))
-
-
-def _first_link(model: pin.Model, joint: int) -> str:
-    """The link that a joint moves; what is fixed to that link comes behind it."""
-    return next(frame.name for frame in model.frames if frame.parentJoint == joint and frame.type == pin.FrameType.BODY)
-
-
-def _chain(model: pin.Model, base: str, ee: str) -> tuple[str, ...]:
-    """Movable joints from base to end effector, base first."""
-    above_base = set(model.supports[model.frames[model.getFrameId(base)].parentJoint])
-    above_ee = model.supports[model.frames[model.getFrameId(ee)].parentJoint]
-    return tuple(model.names[joint] for joint in above_ee if joint not in above_base)
+    return ArmAngleFrames(*(tree.joint(joints[i]).child for i in (1, 3, 5)))
 
 
 @lru_cache

@@ -2,12 +2,11 @@
 
 import hashlib
 import importlib.metadata
-import math
 import os
 import tempfile
 import xml.etree.ElementTree as ET
-from collections.abc import Sequence
 from pathlib import Path
+from xml.parsers import expat
 
 import pinocchio as pin  # pyright: ignore[reportMissingImports]
 
@@ -15,7 +14,8 @@ from er_il.support.atomic_files import write_atomically
 from er_il.support.errors import ArmError
 
 PACKAGE = "package://"
-TURN = 2.0 * math.pi  # [rad] a continuous joint gets limits of one turn to either side
+LARGEST = 16 * 2**20  # [bytes] of a URDF, which names its meshes and holds none
+DEEPEST = 100  # nested elements
 
 
 def example_robot_data(relative: str) -> Path:
@@ -42,14 +42,39 @@ def parse_urdf(path: Path) -> ET.Element:
         ArmError: the file is unreadable or no URDF.
     """
     try:
-        root = ET.parse(path).getroot()
+        if path.stat().st_size > LARGEST:
+            raise ArmError(f"{path} is larger than {LARGEST // 2**20} MiB: that is no URDF.")
+        root = _read_xml(path)
     except OSError as error:
         raise ArmError(f"Cannot read the URDF {path}: {error.strerror}.") from error
-    except ET.ParseError as error:
+    except (ET.ParseError, expat.ExpatError, ValueError, LookupError) as error:  # the latter of unknown encodings
         raise ArmError(f"{path} is not valid XML ({error}).") from error
     if root.tag != "robot" or root.find("link") is None:
         raise ArmError(f"{path} is not a URDF: it has no <robot> with links.")
     return root
+
+
+def _read_xml(path: Path) -> ET.Element:
+    """Read XML from others: without entities, which can grow without bounds, and no deeper than its readers recurse."""
+    data, depth = path.read_bytes(), 0
+
+    def refuse_entity(name: str, *rest: object) -> None:
+        raise ArmError(f"{path} declares the XML entity {name!r}; a URDF needs none.")
+
+    def enter(name: str, attributes: object) -> None:
+        nonlocal depth
+        depth += 1
+        if depth > DEEPEST:
+            raise ArmError(f"{path} is not a URDF: its elements are nested deeper than {DEEPEST}.")
+
+    def leave(name: str) -> None:
+        nonlocal depth
+        depth -= 1
+
+    checker = expat.ParserCreate()
+    checker.EntityDeclHandler, checker.StartElementHandler, checker.EndElementHandler = refuse_entity, enter, leave
+    checker.Parse(data, True)
+    return ET.fromstring(data)
 
 
 def find_mesh(name: str, urdf: Path) -> Path:
@@ -81,52 +106,13 @@ def generated_urdf(text: str, name: str) -> Path:
     return path
 
 
-def kinematic_xml(path: Path, movable: Sequence[str] | None = None) -> str:
-    """Return what kinematics needs of a URDF, as XML.
-
-    Meshes are left out; joints outside ``movable`` become fixed; a continuous joint becomes a
-    revolute one with limits of one turn to either side, since joint commands need a range.
-    """
-    root = parse_urdf(path)
-    for link in root.findall("link"):
-        for shape in link.findall("visual") + link.findall("collision"):
-            link.remove(shape)
-    for joint in root.findall("joint"):
-        if movable is not None and joint.get("name") not in movable:
-            joint.set("type", "fixed")
-        elif joint.get("type") == "continuous":
-            joint.set("type", "revolute")
-            limit = joint.find("limit")
-            limit = ET.SubElement(joint, "limit") if limit is None else limit
-            limit.attrib.update(lower=str(-TURN), upper=str(TURN))
-            limit.attrib.setdefault("effort", "0")
-            limit.attrib.setdefault("velocity", "0")
-    return ET.tostring(root, encoding="unicode")
-
-
-def only_tip(xml: str, name: str) -> str:
-    """Find the link at the end of a URDF's text that has one branch only.
-
-    Raises:
-        ArmError: it has several.
-    """
-    robot = ET.fromstring(xml)
-    parents = {parent.get("link") for parent in robot.iterfind("joint/parent")}
-    tips = [link for element in robot.findall("link") if (link := element.get("name", "")) not in parents]
-    if len(tips) != 1:
-        raise ArmError(f"{name} ends in several links, so name the end-effector frame, such as {', '.join(tips)}.")
-    return tips[0]
-
-
 def pinocchio_model(xml: str, name: str) -> pin.Model:
     """Build the model of a URDF's text.
 
     Raises:
-        ArmError: links and joints form no single tree, or a joint lacks what its type needs.
+        ArmError: the library finds a mistake that :mod:`er_il.arms.robot_tree` has not found.
     """
     try:
         return pin.buildModelFromXML(xml)
     except ValueError as error:
-        raise ArmError(
-            f"{name} describes no single tree of links, or a joint lacks its parent, child or limits."
-        ) from error
+        raise ArmError(f"{name} cannot be read: {' '.join(str(error).split())}") from error

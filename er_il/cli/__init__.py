@@ -2,10 +2,14 @@
 
 import importlib
 import os
+import signal
 import sys
+import threading
 from collections.abc import Callable
+from types import FrameType
+from typing import NoReturn
 
-from er_il.support.errors import ErIlError
+from er_il.support.failures import REPORT, explanation
 
 # Command -> module under er_il.cli that holds a function of the command's name. The modules import the standard
 # library and tyro only; NumPy, torch, MuJoCo and the like wait inside the functions, so that help is instant.
@@ -26,12 +30,14 @@ COMMANDS: dict[str, str] = {
     "view": "view",
 }
 
+
 USER_MISTAKE = 2  # exit code, as for unknown options
 INTERRUPTED = 130
 
 
 def main() -> None:
-    """Run the command line; user mistakes print one line and exit with code 2."""
+    """Run the command line; user mistakes print one line and exit with code 2, interruptions with code 130."""
+    interruption = _Interruption()
     try:
         import tyro  # here, where Ctrl-C is answered
 
@@ -40,25 +46,44 @@ def main() -> None:
             prog="er-il",
             description="Redundancy-aware action spaces for robot imitation learning.",
         )
-    except ErIlError as error:
-        _leave(f"error: {error}", USER_MISTAKE)
-    except (PermissionError, FileExistsError, IsADirectoryError, NotADirectoryError) as error:
-        _leave(f"error: {error.strerror}: {error.filename}", USER_MISTAKE)
     except BrokenPipeError:  # the reader has seen enough, as in: er-il advise panda | head
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
-    except OSError as error:
-        if error.errno is None:
-            raise
-        _leave(f"error: {os.strerror(error.errno)}: {error.filename}", USER_MISTAKE)
     except KeyboardInterrupt:
         _leave("Interrupted. The same command resumes.", INTERRUPTED)
+    except Exception as error:
+        if interruption.came:  # a library that was being imported, or called back, has made something else of it
+            _leave("Interrupted. The same command resumes.", INTERRUPTED)
+        if said := explanation(error):
+            _leave(f"error: {said}", USER_MISTAKE)
+        error.add_note(REPORT)
+        raise
+    finally:
+        interruption.restore()
+
+
+class _Interruption:
+    """Remembers Ctrl-C, which also raises a KeyboardInterrupt as ever."""
+
+    def __init__(self) -> None:
+        self.came = False
+        self._before = signal.getsignal(signal.SIGINT)
+        if self._before is signal.default_int_handler and threading.current_thread() is threading.main_thread():
+            signal.signal(signal.SIGINT, self._remember)
+
+    def _remember(self, number: int, frame: FrameType | None) -> None:
+        self.came = True
+        raise KeyboardInterrupt
+
+    def restore(self) -> None:
+        if signal.getsignal(signal.SIGINT) == self._remember:
+            signal.signal(signal.SIGINT, self._before)
 
 
 def _command(name: str, module: str) -> Callable[..., None]:
     return getattr(importlib.import_module(f"er_il.cli.{module}"), name.replace("-", "_"))
 
 
-def _leave(message: str, code: int) -> None:
+def _leave(message: str, code: int) -> NoReturn:
     print(message, file=sys.stderr)
     sys.exit(code)

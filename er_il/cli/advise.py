@@ -37,10 +37,11 @@ def advise(
 
     from er_il.cli.progress import make_progress
     from er_il.spaces.joint_choice import choices
-    from er_il.support.atomic_files import write_json
+    from er_il.support.atomic_files import check_writable, write_json
     from er_il.support.provenance import provenance
     from er_il.support.workers import cores
 
+    check_writable(json, plot)
     console = Console()
     found = _arms(source, robot, episodes)
     for arm, _ in found.values():

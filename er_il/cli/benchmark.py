@@ -34,10 +34,12 @@ def benchmark(
     from er_il.cli.progress import make_progress
     from er_il.experiments.cluster import RayExecutor
     from er_il.experiments.plan import Plan
+    from er_il.support.atomic_files import check_writable
     from er_il.support.workers import LocalExecutor, cores
 
     plan = Plan(asked, (out or Path("outputs/benchmark") / grid.stem).resolve())
     folder, console = results or Path("results") / grid.stem, Console()
+    check_writable(plan.out, folder)
     workplace = RayExecutor(ray_address) if ray_address else LocalExecutor(cores())
     plan.check()  # seconds of imports follow: mistakes are told before
     with workplace as executor, make_progress(console) as progress:

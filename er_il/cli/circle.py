@@ -17,7 +17,9 @@ def circle(*, arm: str = "panda", out: Path = Path("outputs/circle")) -> None:
     from rich.console import Console
 
     from er_il.arms.arm import Arm
+    from er_il.support.atomic_files import check_writable
 
+    check_writable(out)
     subject = Arm.preset(arm)  # seconds of imports follow: mistakes are told before
     from er_il.experiments.studies.circle import study_circle
     from er_il.report.circle import circle_figure

@@ -33,7 +33,10 @@ def eval(
     from er_il.cli.progress import make_progress
     from er_il.evaluation.checks import check_evaluation
     from er_il.policy.training import pretrained
+    from er_il.support.atomic_files import check_writable
 
+    folder = out or Path("outputs/eval") / task / decoder
+    check_writable(folder)
     found = pretrained(policy)
     # Seconds of imports follow: mistakes are told before.
     check_evaluation(found, task, decoder, episodes, on_invalid, trust)
@@ -56,7 +59,6 @@ def eval(
             trust=trust,
             advance=lambda count: progress.update(bar, advance=count),
         )
-    folder = out or Path("outputs/eval") / task / decoder
     meta = provenance() | {"policy": str(policy), "first_seed": seed, "episodes": episodes, "on_invalid": on_invalid}
     rollouts = long_form([({"task": task, "decoder": decoder}, done)])
     report = summarise(rollouts)

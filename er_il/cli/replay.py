@@ -17,6 +17,7 @@ def replay(datasets: Positional[tuple[str, ...]], *, out: Path = Path("outputs/r
 
     from er_il.cli.progress import make_progress
     from er_il.datasets.hub import find_datasets
+    from er_il.support.atomic_files import check_writable
     from er_il.support.counts import tally
     from er_il.support.errors import DatasetError
     from er_il.support.provenance import provenance
@@ -24,6 +25,7 @@ def replay(datasets: Positional[tuple[str, ...]], *, out: Path = Path("outputs/r
 
     if not datasets:
         raise DatasetError("Name a dataset or a task, such as reach_cup.")
+    check_writable(out)
     found = find_datasets(datasets)
     from er_il.evaluation.replay import replay as replay_datasets
     from er_il.evaluation.replay import write_report

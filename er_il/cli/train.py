@@ -35,6 +35,7 @@ def train(
     from er_il.policy.configuration import default_config, default_steps
     from er_il.policy.training import Training
     from er_il.spaces.registry import check_space
+    from er_il.support.atomic_files import check_outside, check_writable
 
     task_id(task)
     check_space(space)
@@ -48,6 +49,8 @@ def train(
         steps=default_steps(chosen) if steps is None else steps,
         seed=seed,
     )
+    check_outside(training.out, training.dataset)
+    check_writable(training.out)
     if training.finished:
         print(
             f"{training.policy}: trained already, for {training.done_steps} steps. Remove {training.out} to start anew."

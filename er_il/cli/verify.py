@@ -23,10 +23,13 @@ def verify(dataset: Positional[str], *, out: Path | None = None) -> None:
     from er_il.cli.progress import make_progress
     from er_il.datasets.dataset import Dataset
     from er_il.datasets.hub import find_dataset
+    from er_il.support.atomic_files import check_writable
     from er_il.support.errors import DatasetError
     from er_il.support.provenance import provenance
     from er_il.support.workers import cores
 
+    target = out or Path("outputs/verify") / Path(dataset).name
+    check_writable(target)
     folder = find_dataset(dataset)
     _ = Dataset(folder).layout  # seconds of imports follow: mistakes are told before
     from er_il.datasets.verification import verify as verify_dataset
@@ -45,7 +48,6 @@ def verify(dataset: Positional[str], *, out: Path | None = None) -> None:
     console.print(terminal_table(table("verification", **report)))
     for note in sentences("verification.txt.j2", **report):
         console.print(escape(note), highlight=False, soft_wrap=True)
-    target = out or Path("outputs/verify") / Path(dataset).name
     write_study(report, target, console, {"round_trip.png": lambda _: verification_figure(verification, dataset)})
     if verification.findings:
         raise DatasetError(" ".join(f"{label}: {text}" for label, text in verification.findings.items()))

@@ -35,6 +35,7 @@ def view(
 
     from rich.console import Console
 
+    from er_il.support.atomic_files import check_writable
     from er_il.support.display import has_display
     from er_il.viewer.destination import check_address, check_file, require_display
     from er_il.viewer.source import read_source
@@ -45,6 +46,7 @@ def view(
         require_display()
     if save:
         check_file(save)
+        check_writable(save)
     check_address(address)
     trace, shapes = read_source(source, episode, arm)
     from er_il.viewer import show  # Rerun: a second of imports

@@ -11,6 +11,7 @@ from lerobot.datasets.io_utils import load_info
 from er_il.datasets.dataset import Dataset
 from er_il.spaces.joint import JOINT
 from er_il.spaces.layout import Layout, Part
+from er_il.support.errors import DatasetError
 from er_il.support.provenance import provenance
 
 HISTORY = Path("meta/er_il.json")
@@ -37,8 +38,7 @@ def sign(dataset: Dataset, source: str, options: dict[str, Any]) -> None:
         source: The dataset it was made from, its name or repository id.
         options: What else was asked for, as JSON.
     """
-    path = dataset.root / HISTORY
-    history: list[Any] = json.loads(path.read_text()) if path.exists() else []
+    path, history = dataset.root / HISTORY, read_history(dataset.root)
     made = {key: value for key, value in provenance().items() if key != "machine"}
     path.write_text(json.dumps([*history, {"source": source, **options, **made}], indent=2))
     card = dataset.root / CARD
@@ -46,6 +46,22 @@ def sign(dataset: Dataset, source: str, options: dict[str, Any]) -> None:
     text = card.read_text() if card.exists() else str(create_lerobot_dataset_card(dataset_info=info))
     text = re.sub(f"\n*{_START}.*{_END}\n*", "\n", text, flags=re.DOTALL)
     card.write_text(f"{text.rstrip()}\n\n{_START}\n{_section(dataset.layout, source)}\n{_END}\n")
+
+
+def read_history(root: Path) -> list[Any]:
+    """Read what a dataset's re-encodings have written down so far; empty if it is none.
+
+    Raises:
+        DatasetError: the file is damaged.
+    """
+    path = root / HISTORY
+    try:
+        history = json.loads(path.read_text()) if path.exists() else []
+    except (ValueError, RecursionError) as error:
+        raise DatasetError(f"{path} is damaged, not valid JSON.") from error
+    if not isinstance(history, list):
+        raise DatasetError(f"{path} is damaged: it holds no list.")
+    return history
 
 
 def _section(layout: Layout, source: str) -> str:

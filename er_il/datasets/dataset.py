@@ -1,6 +1,6 @@
 """A LeRobot v3 dataset on disk: metadata, columns and episodes, read without LeRobot, whose import takes seconds."""
 
-import json
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -8,16 +8,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from er_il.datasets.metadata import DatasetInfo
 from er_il.datasets.schema import LEADER_JOINTS, SOURCE_ACTION, STATE, Feature, dimension_names
+from er_il.datasets.tables import column_of, episode_slices, parquet_files, read_table, reading
 from er_il.spaces.joint import JOINT
 from er_il.spaces.layout import Layout
 from er_il.spaces.spec import ACTION, SPEC
 from er_il.support.atomic_files import PARTIAL
-from er_il.support.errors import DatasetError
+from er_il.support.declaration import check_values
+from er_il.support.errors import DatasetError, SpecError
+from er_il.support.json_files import read_json
 
 Floats = NDArray[np.float32]
 
@@ -41,17 +44,15 @@ class Dataset:
         """Contents of ``meta/info.json``."""
         kind = "a LeRobot v3 dataset"
         info = read_metadata(self.root, INFO, kind)
-        try:
-            version, frames, _ = str(info["codebase_version"]), info["total_frames"], info["fps"]
-            features = {name: each | {"shape": tuple(each["shape"])} for name, each in info["features"].items()}
-        except (AttributeError, KeyError, TypeError) as error:
-            raise DatasetError(f"{self.root} is not {kind}: its {INFO} is incomplete ({error}).") from error
-        if not version.startswith(VERSION):
+        version = str(info.get("codebase_version"))
+        if "codebase_version" in info and not version.startswith(VERSION):
             raise DatasetError(
                 f"{self.root} is a LeRobot dataset of version {version}, not v3.0. Convert it first: "
                 "python -m lerobot.scripts.convert_dataset_v21_to_v30."
             )
-        if not frames or ACTION not in features:
+        check_values(DatasetInfo, info, self.root / INFO, DatasetError)
+        features = {name: each | {"shape": tuple(each["shape"])} for name, each in info["features"].items()}
+        if not info["total_frames"] or not info["total_episodes"] or ACTION not in features:
             raise DatasetError(f"{self.root} holds no actions.")
         return info | {"features": features}
 
@@ -81,13 +82,17 @@ class Dataset:
 
         Raises:
             DatasetError: there is none.
+            SpecError: it is damaged.
         """
         if not self.specified:
             raise DatasetError(
                 "The dataset does not say what its actions mean. Write it again so that it does, as it is or in "
                 "another space: er-il encode DATASET --to joint --arm panda --out OUT."
             )
-        return self.features[ACTION]["info"][SPEC]
+        spec = self.features[ACTION]["info"][SPEC]
+        if not isinstance(spec, dict) or not isinstance(spec.get("space"), str):
+            raise SpecError(f"{self.root / INFO} is damaged: its action spec names no action space.")
+        return spec
 
     @cached_property
     def layout(self) -> Layout:
@@ -97,7 +102,13 @@ class Dataset:
             DatasetError: the dataset does not say what its actions mean.
             SpecError: the specification is damaged, or of another version.
         """
-        return Layout.from_spec(self.spec)
+        layout = Layout.from_spec(self.spec)
+        if layout.encoded_names != self.names(ACTION):
+            raise SpecError(
+                f"{self.root / INFO} says that the actions are {', '.join(layout.encoded_names)}, but names their "
+                f"dimensions {', '.join(self.names(ACTION))}."
+            )
+        return layout
 
     def names(self, column: str) -> tuple[str, ...]:
         """Names of a column's dimensions; empty if there is no such column."""
@@ -105,7 +116,19 @@ class Dataset:
 
     def column(self, name: str) -> NDArray[Any]:
         """Read a numeric column (N, dim), in the order of the data's files."""
-        return np.concatenate([column_of(read_table(path, name), name) for path in self.data_files])
+        parts = []
+        for path in self.data_files:
+            parts.append(column_of(read_table(path, name), name, path))
+            if name in self.features and parts[-1].shape[1] != (width := math.prod(self.features[name]["shape"])):
+                raise DatasetError(
+                    f"{path} is damaged: its column {name} is {parts[-1].shape[1]} wide, not {width} as {INFO} says."
+                )
+        values = np.concatenate(parts)
+        if len(values) != self.frames:
+            raise DatasetError(
+                f"{self.root / DATA} is incomplete: it holds {len(values)} frames, but {INFO} says {self.frames}."
+            )
+        return values
 
     def vectors(self, column: str) -> Floats:
         """Read a column of vectors (N, dim)."""
@@ -115,12 +138,28 @@ class Dataset:
     def episodes(self) -> dict[int, slice]:
         """Rows of each episode, by its number."""
         numbers = self.column(EPISODE)[:, 0]
-        return {int(numbers[rows.start]): rows for rows in episode_slices(numbers)}
+        slices = episode_slices(numbers)
+        found = {int(numbers[rows.start]): rows for rows in slices}
+        if numbers.dtype.kind not in "iu" or sorted(found) != list(range(len(slices))) or len(found) != self.count:
+            raise DatasetError(
+                f"{self.root / DATA} is damaged: its frames are not those of episodes 0 to {self.count - 1}, one after "
+                "the other."
+            )
+        return found
+
+    @property
+    def count(self) -> int:
+        """Number of episodes."""
+        return self.info["total_episodes"]
 
     def rows(self, table: str, columns: Sequence[str], episode: int) -> list[dict[str, Any]]:
         """Read columns of :data:`DATA` or :data:`EPISODES`, in the rows of an episode."""
         filters = [(EPISODE, "==", episode)]
-        return pq.read_table(self.root / table, columns=list(columns), filters=filters).to_pylist()
+        with reading(self.root / table):
+            rows = pq.read_table(self.root / table, columns=list(columns), filters=filters).to_pylist()
+        if not rows:
+            raise DatasetError(f"{self.root / table} has nothing of episode {episode}.")
+        return rows
 
     @property
     def data_files(self) -> list[Path]:
@@ -165,45 +204,8 @@ def read_metadata(root: Path, name: Path, kind: str) -> dict[str, Any]:
         kind: What kind of dataset has such a file.
 
     Raises:
-        DatasetError: it is missing or no JSON.
+        DatasetError: it is missing, or no JSON object.
     """
-    try:
-        return json.loads((root / name).read_text())
-    except (FileNotFoundError, NotADirectoryError) as error:
-        raise DatasetError(f"{root} is not {kind}: it has no {name}.") from error
-    except ValueError as error:
-        raise DatasetError(f"{root} is not {kind}: its {name} is damaged, not valid JSON.") from error
-
-
-def read_table(path: Path, *columns: str) -> pa.Table:
-    """Read columns of a parquet file, all by default; those that it lacks are left out.
-
-    Raises:
-        DatasetError: the file is incomplete, as LeRobot leaves it when a recording is killed.
-    """
-    try:
-        # With a row group an episode, several times as fast as pq.read_table, which reads folders of files too.
-        with pq.ParquetFile(path) as file:
-            return file.read(columns=list(columns) or None)
-    except pa.ArrowInvalid as error:
-        raise DatasetError(f"{path} is damaged, as by a recording that was killed: {error}") from error
-
-
-def column_of(table: pa.Table, name: str) -> NDArray[Any]:
-    """Values (rows, dim) of a numeric column of a table."""
-    if name not in table.column_names:
-        raise DatasetError(f"The data have no column {name}, though the dataset's metadata name it.")
-    column = table.column(name).combine_chunks()
-    flat = column.flatten() if pa.types.is_nested(column.type) else column
-    return flat.to_numpy(zero_copy_only=False).reshape(len(table), -1)
-
-
-def episode_slices(numbers: NDArray[np.int64]) -> list[slice]:
-    """Rows of each episode, from the episode (N,) of each row."""
-    starts = np.flatnonzero(np.diff(numbers, prepend=-1)).tolist()
-    return [slice(start, stop) for start, stop in zip(starts, [*starts[1:], len(numbers)], strict=True)]
-
-
-def parquet_files(folder: Path) -> list[Path]:
-    """Parquet files of a table's folder, in order."""
-    return sorted(folder.glob("*/*.parquet"))
+    if not (root / name).exists():
+        raise DatasetError(f"{root} is not {kind}: it has no {name}.")
+    return read_json(root / name, DatasetError)

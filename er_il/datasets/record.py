@@ -8,7 +8,7 @@ from er_il.datasets.dataset import Dataset, Floats, read_metadata
 from er_il.datasets.recipe import Recipe
 from er_il.datasets.schema import DEMO_SEED, LEADER_JOINTS, STATE
 from er_il.spaces.spec import ACTION
-from er_il.support.errors import DatasetError
+from er_il.support.errors import DatasetError, ErIlError
 
 RECORD = Path("meta/recipe.json")
 
@@ -36,6 +36,8 @@ class DatasetRecord:
         try:
             dropped = {int(seed): str(reason) for seed, reason in values["dropped"].items()}
             return cls(Recipe.from_dict(values["recipe"]), dropped)
+        except ErIlError as error:
+            raise DatasetError(f"{dataset / RECORD} is damaged: {error}") from error
         except (KeyError, TypeError, AttributeError, ValueError) as error:
             raise DatasetError(f"{dataset / RECORD} is not the record of a dataset.") from error
 

@@ -8,10 +8,11 @@ from typing import Any
 
 from er_il.datasets.dataset import Dataset
 from er_il.datasets.hub import find_dataset
+from er_il.datasets.integrity import check_whole
 from er_il.datasets.wiring import Wiring, wire
 from er_il.spaces.joint import JOINT
 from er_il.spaces.layout import Layout
-from er_il.support.atomic_files import check_absent
+from er_il.support.atomic_files import check_absent, check_outside, check_writable
 from er_il.support.errors import DatasetError
 
 
@@ -63,9 +64,13 @@ def reencode(
     encoded = dataset.specified and dataset.spec["space"] != JOINT
     decode = encoded and (kind == JOINT or dataset.joints_column(layout) is None)
     check_absent(target)
+    check_outside(target, dataset.root)
+    check_writable(target)
+    check_whole(dataset)
     from er_il.datasets import card  # LeRobot: seconds of imports; mistakes are told before
     from er_il.datasets.encoding import decode_dataset, encode_dataset
 
+    card.read_history(dataset.root)  # raises if it is damaged
     done = 0
 
     def advance(frames: int) -> None:

@@ -16,17 +16,9 @@ from lerobot.datasets.feature_utils import get_hf_features_from_features
 from lerobot.datasets.io_utils import load_info, load_stats, write_info, write_table_one_row_group_per_episode
 from numpy.typing import NDArray
 
-from er_il.datasets.dataset import (
-    DATA,
-    EPISODE,
-    EPISODES,
-    Dataset,
-    Floats,
-    episode_slices,
-    parquet_files,
-    read_table,
-)
+from er_il.datasets.dataset import DATA, EPISODE, EPISODES, Dataset, Floats
 from er_il.datasets.schema import Feature
+from er_il.datasets.tables import episode_slices, parquet_files, read_table
 from er_il.support.links import check_links
 
 Stats = dict[str, dict[str, NDArray[Any]]]

@@ -45,8 +45,8 @@ def action_feature(layout: Layout) -> Feature:
 def dimension_names(feature: Feature) -> tuple[str, ...]:
     """Names of a column's dimensions; their numbers if it names none."""
     names = feature.get("names")
-    if isinstance(names, Mapping):  # such as {"motors": [...]}, which older datasets have
-        names = [name for group in names.values() for name in group]
+    if isinstance(names, Mapping):  # such as {"motors": [...]}, which older datasets have, or {"x": 0, "y": 1}
+        names = [each for name, group in names.items() for each in (group if isinstance(group, list) else [name])]
     count = math.prod(feature["shape"])
     return tuple(map(str, names)) if names and len(names) == count else tuple(map(str, range(count)))
 

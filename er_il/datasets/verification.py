@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from er_il.datasets.dataset import Dataset
 from er_il.datasets.decoding import DecodedEpisode, EncodedEpisode, decode_episodes, read_encoded_episodes
+from er_il.datasets.integrity import check_whole
 from er_il.datasets.sanity_checks import JointSample, check_joint_values
 from er_il.datasets.schema import STATE
 from er_il.kinematics.rotation import Quaternion
@@ -121,6 +122,7 @@ def verify(root: Path, workers: int, on_progress: Callable[[int, int], object]) 
     """
     dataset = Dataset(root)
     layout = dataset.layout
+    check_whole(dataset)
     truth = dataset.joints_column(layout)
     episodes = read_encoded_episodes(dataset, layout, truth)
     findings = _findings(dataset, layout, episodes)

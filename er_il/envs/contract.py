@@ -10,17 +10,20 @@ for instance ``er_il:erj/panda/panda_hand_tcp/quat/panda_joint1``; a dash stands
 the space does not have, a plus sign joins several joints.
 """
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import BaseModel, Field, StrictInt, StrictStr
 
 from er_il.envs.trust import check_steps
 from er_il.kinematics.rotation import Quaternion
 from er_il.spaces.base import ArmSpace
 from er_il.spaces.spec import action_spec
+from er_il.support.declaration import check_values
 from er_il.support.errors import DatasetError, PolicyError
+from er_il.support.json_files import read_json
 
 PREFIX = "er_il:"
 NONE = "-"
@@ -80,11 +83,7 @@ def dataset_info(root: str | Path) -> dict[str, Any]:
     Raises:
         DatasetError: there is no dataset at ``root``.
     """
-    path = Path(root) / "meta" / "info.json"
-    try:
-        return json.loads(path.read_text())
-    except (OSError, ValueError) as error:
-        raise DatasetError(f"No dataset at {root}: {path} is missing or unreadable.") from error
+    return read_json(Path(root) / "meta" / "info.json", DatasetError)
 
 
 def policy_contract(policy: str | Path) -> Contract:
@@ -134,27 +133,72 @@ def check_policy(policy: str | Path, space: ArmSpace, trust: bool = False) -> No
         raise PolicyError(f"The policy {policy} was trained for another action space: {differences}.")
 
 
+class _Shaped(BaseModel):
+    type: StrictStr
+    shape: tuple[Annotated[StrictInt, Field(ge=1)], ...]
+
+
+class _PolicyConfig(BaseModel):
+    """What er_il needs of a policy's configuration."""
+
+    type: StrictStr
+    input_features: dict[StrictStr, _Shaped] | None = None
+    output_features: dict[StrictStr, _Shaped] | None = None
+    tags: list[StrictStr] | None = None
+
+
+class _Processor(BaseModel):
+    """What er_il needs of a policy's pre- and post-processor."""
+
+    steps: list[dict[StrictStr, Any]]
+
+
+def read_policy_config(policy: Path) -> dict[str, Any]:
+    """Read the ``config.json`` of a policy in a folder.
+
+    Raises:
+        PolicyError: it is missing or damaged.
+    """
+    path = policy / "config.json"
+    config = read_json(path, PolicyError)
+    check_values(_PolicyConfig, config, path, PolicyError)
+    return config
+
+
+def read_processor(path: Path) -> dict[str, Any]:
+    """Read a policy's pre- or post-processor.
+
+    Raises:
+        PolicyError: it is missing or damaged.
+    """
+    processor = read_json(path, PolicyError)
+    check_values(_Processor, processor, path, PolicyError)
+    return processor
+
+
 def decodes(policy: str | Path) -> bool:
     """True if a policy in a folder decodes its actions by itself (see :mod:`er_il.robots.attachment`)."""
-    try:
-        steps = json.loads((Path(policy) / "policy_postprocessor.json").read_text())["steps"]
-        return any(step.get("registry_name") == DECODE_POLICY_ACTION for step in steps)
-    except (OSError, ValueError, KeyError):
-        return False
+    path = Path(policy) / "policy_postprocessor.json"
+    if not path.is_file():
+        return False  # LeRobot says what is missing
+    return any(step.get("registry_name") == DECODE_POLICY_ACTION for step in read_processor(path)["steps"])
 
 
 def _of_dataset(policy: Path) -> Contract | None:
+    path = policy / "train_config.json"
+    if not path.is_file():
+        return None
     try:
-        root = json.loads((policy / "train_config.json").read_text())["dataset"]["root"]
+        root = read_json(path, PolicyError)["dataset"]["root"]
         return Contract.of_spec(action_spec(dataset_info(root)["features"])) if root else None
-    except (OSError, ValueError, KeyError, TypeError, DatasetError):
+    except (OSError, KeyError, TypeError, AttributeError, DatasetError):
         return None  # trained elsewhere, or the dataset has moved: the tag has to do
 
 
 def _tags(policy: str | Path) -> list[str] | None:
     try:
         if (config := Path(policy) / "config.json").is_file():
-            return json.loads(config.read_text()).get("tags")
+            return read_policy_config(config.parent).get("tags")
         from lerobot.configs import PreTrainedConfig  # seconds of imports that a folder does without
 
         return PreTrainedConfig.from_pretrained(policy).tags

@@ -13,6 +13,8 @@ from er_il.evaluation.rollout import Rollout
 from er_il.evaluation.statistics import exact_interval, paired_difference
 from er_il.kinematics.solver import Status
 from er_il.support.atomic_files import write_atomically
+from er_il.support.errors import ErIlError
+from er_il.support.json_files import read_json
 
 REFERENCE = "joint"  # the decoder that the others are compared with, rollout by rollout
 RESULTS = "results.json"  # the report of a grid, from which everything is rendered
@@ -31,16 +33,28 @@ def save_rollouts(rollouts: Sequence[Rollout], path: Path, notes: Mapping[str, A
 
 
 def load_rollouts(path: Path) -> list[Rollout]:
-    """Read what :func:`save_rollouts` wrote."""
-    return [
-        Rollout(**each | {"statuses": Counter(each["statuses"]), "latencies": tuple(each["latencies"])})
-        for each in json.loads(path.read_text())["episodes"]
-    ]
+    """Read what :func:`save_rollouts` wrote.
+
+    Raises:
+        ErIlError: the file is missing or damaged.
+    """
+    try:
+        return [
+            Rollout(**each | {"statuses": Counter(each["statuses"]), "latencies": tuple(each["latencies"])})
+            for each in read_json(path, ErIlError)["episodes"]
+        ]
+    except (KeyError, TypeError) as error:
+        raise ErIlError(
+            f"{path} is damaged: it holds no rollouts. Delete it, and the same command makes it again."
+        ) from error
 
 
 def load_notes(path: Path) -> dict[str, Any]:
     """Read the notes that :func:`save_rollouts` wrote."""
-    return json.loads(path.read_text())["notes"]
+    notes = read_json(path, ErIlError).get("notes")
+    if not isinstance(notes, dict):
+        raise ErIlError(f"{path} is damaged: it holds no notes. Delete it, and the same command makes it again.")
+    return notes
 
 
 def long_form(groups: Iterable[tuple[Mapping[str, object], Iterable[Rollout]]]) -> pd.DataFrame:

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.progress import Progress
 
+from er_il.datasets.dataset import Dataset
 from er_il.datasets.recipe import Recipe
 from er_il.datasets.record import read_episodes
 from er_il.datasets.recording import generate
-from er_il.envs.contract import dataset_info
 from er_il.evaluation.elbow import ElbowReference
 from er_il.evaluation.posture_baselines import POSTURE_BASELINES, POSTURE_DECODER
 from er_il.experiments.schedule import Job
@@ -149,7 +149,7 @@ class Film(Job):
 @lru_cache(maxsize=4)  # jobs of one policy follow one another
 def _demonstrated(training: Training) -> tuple[list[NDArray[np.float64]], ElbowReference | None]:
     """The leader's paths (T, n + 1) [rad and opening] that a policy was trained on, and where the elbow was."""
-    info, episodes = dataset_info(training.dataset), read_episodes(training.dataset)
+    info, episodes = Dataset(training.dataset).info, read_episodes(training.dataset)
     arm = arm_space_from_spec(action_spec(info["features"])).arm
     chosen = [episodes[i] for i in train_episodes(info)[: training.demonstrations]]
     followed = [demo.state[:, : arm.dof].astype(np.float64) for demo in chosen]

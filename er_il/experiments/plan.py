@@ -3,7 +3,6 @@
 So a grid may grow by tasks, decoders, seeds or demonstrations without anything being done again.
 """
 
-import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -12,18 +11,17 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import yaml
-
 from er_il.datasets.record import DatasetRecord
 from er_il.evaluation.posture_baselines import space_of
 from er_il.evaluation.rollout import FIRST_SEED
 from er_il.experiments.grid import Cell, Grid
 from er_il.experiments.jobs import Demonstrate, RollOut, Train
-from er_il.policy.configuration import default_config, default_steps
+from er_il.policy.configuration import default_config, default_steps, read_config
 from er_il.policy.rows import POLICY_ROWS
 from er_il.support.atomic_files import write_json
 from er_il.support.errors import ErIlError
 from er_il.support.folder_lock import LOCK, folder_lock
+from er_il.support.json_files import read_json
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -70,8 +68,10 @@ class Plan:
                         f"{dataset} holds another recipe's demonstrations; asked for is {what}. "
                         f"Choose another --out, or delete what {self.out} holds of {task}."
                     )
-        mine = {name: yaml.safe_load(default_config(name, grid.configuration).read_text()) for name in grid.spaces}
-        owned = json.loads(owner.read_text()) if owner.exists() else {"title": grid.title, "configurations": {}}
+        mine = {name: read_config(default_config(name, grid.configuration)) for name in grid.spaces}
+        owned = read_json(owner, ErIlError) if owner.exists() else {"title": grid.title, "configurations": {}}
+        if not isinstance(owned.get("configurations"), dict) or "title" not in owned:
+            raise ErIlError(f"{owner} is damaged: it does not say which grid the folder belongs to.")
         if owned["title"] != grid.title:
             raise ErIlError(f"{self.out} belongs to the grid {owned['title']!r}; choose another --out.")
         theirs = owned["configurations"]

@@ -1,7 +1,6 @@
 """An experiment from its plan to its results: a report as JSON, every rollout as a row of a CSV, pictures, pages."""
 
 import gzip
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import chain
@@ -17,6 +16,8 @@ from er_il.experiments.plan import Plan
 from er_il.experiments.schedule import Executor, Schedule
 from er_il.report.grid_page import write_pages
 from er_il.support.atomic_files import write_atomically, write_json
+from er_il.support.errors import ErIlError
+from er_il.support.json_files import read_json
 from er_il.support.provenance import provenance
 
 FILMED = ("joint", "erj", "task-nearest", "task-posture")  # as far as the grid has them
@@ -102,7 +103,7 @@ def write_results(plan: Plan, folder: Path) -> dict[str, Any]:
 def _meta(plan: Plan) -> dict[str, Any]:
     grid, complete = plan.grid, plan.complete
     trainings = {plan.training(cell, seed) for cell in grid.cells for seed in grid.training_seeds}
-    trained = [json.loads(training.path.read_text()) for training in trainings if training.done]
+    trained = [read_json(training.path, ErIlError) for training in trainings if training.done]
     rollouts = [job for job in plan.jobs if job.done]
     rolled_out = [load_notes(job.path) for job in rollouts]
     return {

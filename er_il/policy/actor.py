@@ -9,10 +9,12 @@ from typing import Any
 
 import numpy as np
 import torch
+from huggingface_hub.constants import SAFETENSORS_SINGLE_FILE
 from lerobot.configs import PreTrainedConfig
 from lerobot.envs import preprocess_observation
 from lerobot.policies import PreTrainedPolicy, make_policy, make_pre_post_processors
 from lerobot.utils.constants import OBS_IMAGES
+from safetensors.torch import load_model
 from threadpoolctl import threadpool_limits
 
 from er_il.control.commander import BEST_EFFORT
@@ -59,8 +61,29 @@ def one_thread() -> Iterator[None]:
         torch.set_num_threads(threads)
 
 
+@contextmanager
+def _loading(policy: Path) -> Iterator[None]:
+    """Tell by the policy's folder what loading its files raises, which is all kinds of errors of LeRobot and torch."""
+    try:
+        yield
+    except MemoryError:
+        raise
+    except Exception as error:
+        said = " ".join(str(error).split()) or "no reason is given"
+        raise PolicyError(f"LeRobot cannot load the policy {policy} ({type(error).__name__}): {said}") from error
+
+
+def _check_weights(policy: PreTrainedPolicy, path: Path) -> None:
+    """Raise a RuntimeError where the file of the weights is not of this policy: LeRobot leaves what it lacks random."""
+    own = type(policy)
+    loads_as_others = own.from_pretrained.__func__ is PreTrainedPolicy.from_pretrained.__func__
+    if loads_as_others and (weights := path / SAFETENSORS_SINGLE_FILE).is_file():
+        load_model(policy, weights, strict=True)
+
+
 def _load_config(policy: Path) -> PreTrainedConfig:
-    config = PreTrainedConfig.from_pretrained(policy)
+    with _loading(policy):
+        config = PreTrainedConfig.from_pretrained(policy)
     config.pretrained_path = policy
     if hasattr(config, "pretrained_backbone_weights"):
         config.pretrained_backbone_weights = None  # pyright: ignore[reportAttributeAccessIssue]  the checkpoint has them
@@ -83,13 +106,15 @@ class Actor:
             raise PolicyError(
                 f"The policy {path} does not act in {config.action_space} space: its actions differ in length."
             )
-        with redirect_stdout(io.StringIO()):  # LeRobot announces every file it loads
+        with _loading(path), redirect_stdout(io.StringIO()):  # LeRobot announces every file it loads
             policy = make_policy(policy_config, env_cfg=config)
+            _check_weights(policy, path)
         policy.eval()
         overrides = {"device_processor": {"device": str(policy.config.device)}}
-        preprocess, postprocess = make_pre_post_processors(
-            policy_config, pretrained_path=str(path), preprocessor_overrides=overrides
-        )
+        with _loading(path):
+            preprocess, postprocess = make_pre_post_processors(
+                policy_config, pretrained_path=str(path), preprocessor_overrides=overrides
+            )
         return cls(policy, preprocess, postprocess)
 
     def reset(self, seed: int) -> None:

@@ -2,12 +2,13 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-import yaml
+from pydantic import BaseModel, Field, StrictInt, StrictStr
 
 from er_il.datasets.schema import IMAGES
 from er_il.spaces.registry import split_name
+from er_il.support.declaration import check_values, read_yaml
 from er_il.support.errors import PolicyError
 from er_il.support.resources import data_dir
 
@@ -18,16 +19,44 @@ def default_config(space: str, kind: str = "") -> Path:
     return data_dir("configs") / f"act_{split_name(space)[0]}{suffix}.yaml"
 
 
+class _Input(BaseModel):
+    type: StrictStr
+    shape: tuple[StrictInt, ...]
+
+
+class _Policy(BaseModel):
+    input_features: dict[StrictStr, _Input] | None = None
+
+
+class _Configuration(BaseModel):
+    """What er_il needs of a configuration; LeRobot reads, and checks, the rest."""
+
+    steps: Annotated[StrictInt, Field(ge=1)] | None = None
+    policy: _Policy | None = None
+
+
+def read_config(config: Path) -> dict[str, Any]:
+    """Read a training configuration.
+
+    Raises:
+        PolicyError: it is missing or damaged.
+    """
+    values = read_yaml(config, "training configuration", PolicyError)
+    check_values(_Configuration, values, config, PolicyError)
+    assert isinstance(values, dict)
+    return values
+
+
 def default_steps(config: Path) -> int:
     """Return the number of steps that a configuration asks for.
 
     Raises:
-        PolicyError: the configuration is missing or does not say.
+        PolicyError: the configuration is missing or damaged, or does not say.
     """
-    try:
-        return int(yaml.safe_load(config.read_text())["steps"])
-    except (OSError, yaml.YAMLError, KeyError, TypeError, ValueError) as error:
-        raise PolicyError(f"There is no training configuration {config} that says how many steps to take.") from error
+    steps = read_config(config).get("steps")
+    if steps is None:
+        raise PolicyError(f"{config} does not say how many steps to take.")
+    return steps
 
 
 def input_features(config: Path, features: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
@@ -59,4 +88,4 @@ def input_features(config: Path, features: Mapping[str, Any]) -> dict[str, dict[
 
 def named_inputs(config: Path) -> dict[str, dict[str, Any]]:
     """The inputs that a configuration names; empty if it leaves them to LeRobot."""
-    return yaml.safe_load(config.read_text()).get("policy", {}).get("input_features") or {}
+    return (read_config(config).get("policy") or {}).get("input_features") or {}

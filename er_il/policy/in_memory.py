@@ -7,6 +7,7 @@ memory. Takes the arguments of ``lerobot-train``: ``python -m er_il.policy.in_me
 
 import math
 import os
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -16,6 +17,7 @@ from lerobot.datasets import LeRobotDataset
 from lerobot.scripts import lerobot_train
 
 from datasets import Dataset
+from er_il.support.failures import REPORT, explanation
 
 SHARE = 0.5  # of the free memory that images may take
 
@@ -85,7 +87,14 @@ def main() -> None:
         return both
 
     lerobot_train.make_train_eval_datasets = make_in_memory
-    lerobot_train.main()
+    try:
+        lerobot_train.main()
+    except Exception as error:
+        if said := explanation(error):
+            print(f"error: {said}", file=sys.stderr)
+            sys.exit(2)
+        error.add_note(REPORT)
+        raise
 
 
 if __name__ == "__main__":

@@ -12,13 +12,16 @@ from typing import IO, Any
 
 import yaml
 
+from er_il.datasets.dataset import Dataset
+from er_il.datasets.integrity import check_whole
 from er_il.datasets.recipe import TRAIN
-from er_il.envs.contract import Contract, dataset_info
-from er_il.policy.configuration import input_features, named_inputs
+from er_il.envs.contract import Contract
+from er_il.policy.configuration import input_features, named_inputs, read_config
 from er_il.spaces.registry import check_space, split_name
 from er_il.spaces.spec import action_spec
 from er_il.support.atomic_files import write_atomically
 from er_il.support.errors import DatasetError, PolicyError
+from er_il.support.json_files import read_json
 from er_il.support.workers import ONE_THREAD, end_with_parent
 
 STOCK = "lerobot-train"
@@ -51,7 +54,7 @@ class Training:
             raise PolicyError(f"{self.steps} training steps train nothing; ask for at least one.")
         if not self.config.is_file():
             raise PolicyError(f"There is no training configuration {self.config}.")
-        spec = action_spec(dataset_info(self.dataset)["features"])
+        spec = action_spec(Dataset(self.dataset).features)
         kind, joints = split_name(self.space)
         if spec["space"] != kind:
             raise DatasetError(f"The dataset at {self.dataset} holds {spec['space']} actions, not {kind}.")
@@ -65,7 +68,7 @@ class Training:
         last = self._checkpoint
         if last is not None:
             return [STOCK, f"--config_path={last / _PRETRAINED / 'train_config.json'}", "--resume=true", *self._length]
-        info = dataset_info(self.dataset)
+        info = Dataset(self.dataset).info
         contract = Contract.of_spec(action_spec(info["features"]))
         inputs = input_features(self.config, info["features"])
         own = self._renames(inputs)
@@ -86,7 +89,13 @@ class Training:
     def done_steps(self) -> int:
         """Number of steps that the last checkpoint has behind it."""
         last = self._checkpoint
-        return 0 if last is None else json.loads((last / "training_state" / "training_step.json").read_text())["step"]
+        if last is None:
+            return 0
+        path = last / "training_state" / "training_step.json"
+        step = read_json(path, PolicyError).get("step")
+        if not isinstance(step, int):
+            raise PolicyError(f"{path} is damaged: it does not say how many steps are done.")
+        return step
 
     @property
     def finished(self) -> bool:
@@ -116,9 +125,11 @@ class Training:
             return
         if self.out.exists():
             self._clear()
-        inputs = input_features(self.config, dataset_info(self.dataset)["features"])
+        dataset = Dataset(self.dataset)
+        check_whole(dataset)
+        inputs = input_features(self.config, dataset.features)
         if self._renames(inputs):
-            values = yaml.safe_load(self.config.read_text())
+            values = read_config(self.config)
             values["policy"]["input_features"] = inputs
             write_atomically(self.own_config, lambda path: path.write_text(yaml.safe_dump(values, sort_keys=False)))
 
@@ -190,8 +201,13 @@ def train_episodes(info: Mapping[str, Any]) -> list[int]:
     """
     splits = info.get("splits")
     try:
-        assert isinstance(splits, dict)
+        assert isinstance(splits, Mapping)
         start, stop = splits[TRAIN].split(":")
-        return list(range(int(start), int(stop)))
+        episodes = list(range(int(start), int(stop)))
     except (AssertionError, KeyError, ValueError, AttributeError) as error:
         raise DatasetError(f"The dataset names no {TRAIN} episodes in its splits: {splits}.") from error
+    if not episodes or episodes[0] < 0 or episodes[-1] >= info["total_episodes"]:
+        raise DatasetError(
+            f"The dataset has {info['total_episodes']} episodes; its splits take {splits[TRAIN]} of them to train on."
+        )
+    return episodes

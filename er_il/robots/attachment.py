@@ -6,20 +6,20 @@ afterwards. It goes into a copy, because simulated evaluation needs the policy a
 there the environment decodes.
 """
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from er_il.control.commander import BEST_EFFORT
 from er_il.datasets.dataset import Dataset
 from er_il.datasets.schema import STATE
-from er_il.envs.contract import decodes
+from er_il.envs.contract import decodes, read_policy_config
 from er_il.envs.trust import check_steps
 from er_il.policy.training import pretrained
 from er_il.robots.robot_commander import RobotCommander
 from er_il.spaces.spec import ACTION
-from er_il.support.atomic_files import check_absent
+from er_il.support.atomic_files import check_absent, check_outside, check_writable
 from er_il.support.errors import ErIlError, PolicyError, ShapeError
+from er_il.support.json_files import read_json
 from er_il.support.links import check_links
 
 if TYPE_CHECKING:
@@ -71,6 +71,8 @@ def attach(
     RobotCommander(trained_on.layout, period, on_invalid)  # raises what building the step would
     _check_shape(source, trained_on.features[ACTION]["shape"])
     check_absent(out)
+    check_outside(out, source)
+    check_writable(out)
     from er_il.robots.policy_copy import write_copy  # LeRobot: seconds of imports; mistakes are told before
 
     return write_copy(source, out, trained_on.spec, period, on_invalid, trained_on.names(STATE))
@@ -78,12 +80,15 @@ def attach(
 
 def _trained_on(policy: Path) -> Path:
     try:
-        return Path(json.loads((policy / "train_config.json").read_text())["dataset"]["root"])
-    except (OSError, ValueError, KeyError, TypeError) as error:
+        return Path(read_json(policy / "train_config.json", PolicyError)["dataset"]["root"])
+    except (PolicyError, KeyError, TypeError) as error:
         raise PolicyError(f"The policy {policy} does not say where its dataset is; name it with --dataset.") from error
 
 
 def _check_shape(policy: Path, needed: tuple[int, ...]) -> None:
-    shape = json.loads((policy / "config.json").read_text())["output_features"][ACTION]["shape"]
+    outputs = read_policy_config(policy).get("output_features") or {}
+    if ACTION not in outputs:
+        raise PolicyError(f"{policy / 'config.json'} is damaged: the policy has no {ACTION} among its output_features.")
+    shape = outputs[ACTION]["shape"]
     if tuple(shape) != tuple(needed):
         raise ShapeError("The policy's action", tuple(shape), f"{tuple(needed)} as in the dataset")

@@ -9,7 +9,7 @@ from typing import Any
 from lerobot.policies.factory import POLICY_POSTPROCESSOR_DEFAULT_NAME, POLICY_PREPROCESSOR_DEFAULT_NAME
 from lerobot.processor import RelativeActionsProcessorStep
 
-from er_il.envs.contract import DECODE_POLICY_ACTION
+from er_il.envs.contract import DECODE_POLICY_ACTION, read_processor
 from er_il.robots.processors import DecodePolicyAction
 from er_il.support.atomic_files import atomic_folder
 
@@ -54,6 +54,6 @@ def _entry(name: str, config: dict[str, Any]) -> dict[str, Any]:
 
 
 def _edit(path: Path, change: Any) -> None:
-    pipeline = json.loads(path.read_text())
+    pipeline = read_processor(path)
     pipeline["steps"] = change(pipeline["steps"])
     path.write_text(json.dumps(pipeline, indent=2))

@@ -20,6 +20,7 @@ from er_il.spaces.motors import Motors
 from er_il.spaces.references import fitted
 from er_il.spaces.registry import arm_space_from_spec, make_arm_space
 from er_il.spaces.spec import SPEC_VERSION
+from er_il.spaces.spec_types import check_types
 from er_il.support.errors import DatasetError, ShapeError, SpecError
 
 Array = NDArray[np.float64]
@@ -231,6 +232,7 @@ class Layout:
         Raises:
             SpecError: the specification is of another version, incomplete, or does not fit its arm.
         """
+        check_types(spec)
         try:
             if "arms" not in spec:
                 return cls.of_space(arm_space_from_spec(spec, arm_from_spec(spec["arm"])))

@@ -14,6 +14,7 @@ from er_il.spaces.delta import PREFIX, DeltaBounds, DeltaSpace
 from er_il.spaces.joint import JOINT, JointSpace
 from er_il.spaces.pose import TASK, PoseSpace
 from er_il.spaces.spec import SPEC_VERSION
+from er_il.spaces.spec_types import check_types
 from er_il.support.errors import ArmError, SpecError, UnknownNameError
 
 
@@ -104,6 +105,7 @@ def arm_space_from_spec(spec: Mapping[str, Any], arm: Arm | None = None, *, post
     """
     if spec.get("version") != SPEC_VERSION:
         raise SpecError(f"Action spec has version {spec.get('version')!r}; this er_il reads {SPEC_VERSION}.")
+    check_types(spec)
     try:
         described, kind = spec["arm"], spec["space"]
         arm = arm if arm is not None else Arm.preset(described["name"])

@@ -2,6 +2,7 @@
 
 import errno
 import json
+import os
 import shutil
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -11,6 +12,7 @@ from uuid import uuid4
 
 import numpy as np
 
+from er_il.support.errors import ErIlError
 from er_il.support.folder_lock import LOCK, folder_lock
 
 PARTIAL = ".partial"  # in the name of every file and folder that is not complete
@@ -23,12 +25,13 @@ def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_stem(f"{path.stem}{PARTIAL}-{uuid4().hex[:8]}")
-    try:
-        write(partial)
-    except BaseException:
-        partial.unlink(missing_ok=True)
-        raise
-    partial.rename(path)
+    with _naming(path):
+        try:
+            write(partial)
+        except BaseException:
+            partial.unlink(missing_ok=True)
+            raise
+        partial.rename(path)
 
 
 def write_json(path: Path, data: Mapping[str, Any]) -> None:
@@ -61,10 +64,42 @@ def atomic_folder(target: Path) -> Iterator[Path]:
     with work_folder(target) as work:
         _clear(work)
         try:
-            yield work / target.name
+            with _naming(target):
+                yield work / target.name
             (work / target.name).rename(target)
         finally:
             _clear(work)
+
+
+@contextmanager
+def _naming(path: Path) -> Iterator[None]:
+    """Add the path to errors of the system that name none, as those of a full disk."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno is not None and error.filename is None:
+            error.filename = str(path)
+        raise
+
+
+def check_writable(*paths: Path | None) -> None:
+    """Raise an OSError if files or folders could not be written, before the work that they are for.
+
+    Args:
+        paths: Files or folders to write, which need not exist; None is nothing to write.
+    """
+    for path in filter(None, paths):
+        there = next(each for each in (path, *path.absolute().parents) if each.exists())
+        if there != path and not there.is_dir():
+            raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(there))
+        if not os.access(there, os.W_OK):
+            raise PermissionError(errno.EACCES, "It cannot be written", str(path))
+
+
+def check_outside(target: Path, source: Path) -> None:
+    """Raise an ErIlError if a target lies in the folder that it is made from."""
+    if target.resolve().is_relative_to(source.resolve()):
+        raise ErIlError(f"{target} lies in {source}, which it is made from. Choose another --out.")
 
 
 def check_absent(target: Path) -> None:

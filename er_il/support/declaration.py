@@ -1,5 +1,6 @@
 """Plain values from a YAML file, checked against the class that declares them."""
 
+import reprlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, ClassVar, Self
@@ -8,6 +9,9 @@ import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from er_il.support.errors import ErIlError
+
+MOST_VALUES = 100_000  # in a file that a person wrote
+MOST_MISTAKES = 5  # that are listed
 
 
 class Declaration(BaseModel):
@@ -68,16 +72,57 @@ def read_declaration[T](path: Path, noun: str, error: type[ErIlError], build: Ca
         error: What to raise if it is missing, unreadable, or refused by ``build``.
         build: Makes the declared object of plain values.
     """
-    try:
-        values = yaml.safe_load(path.read_text())
-    except FileNotFoundError as cause:
-        raise error(f"There is no {noun} {path}.") from cause
-    except (yaml.YAMLError, UnicodeDecodeError) as cause:
-        raise error(f"{path} is not valid YAML.") from cause
+    values = read_yaml(path, noun, error)
     try:
         return build(values)
     except ErIlError as cause:
         raise error(f"{path}: {cause}") from cause
+
+
+def read_yaml(path: Path, noun: str, error: type[ErIlError]) -> object:
+    """Read the plain values in a YAML (or JSON) file. Tags, which would make other objects, are refused.
+
+    Args:
+        path: The file.
+        noun: What it should be, such as "recipe".
+        error: What to raise if it is missing or unreadable.
+    """
+    try:
+        values = yaml.safe_load(path.read_text())
+    except FileNotFoundError as cause:
+        raise error(f"There is no {noun} {path}.") from cause
+    except (yaml.YAMLError, ValueError, RecursionError) as cause:  # ValueError: no UTF-8, no such date
+        where = getattr(cause, "problem_mark", None)
+        said = f" (line {where.line + 1}: {cause.problem})" if where and hasattr(cause, "problem") else ""  # pyright: ignore[reportAttributeAccessIssue]
+        raise error(f"{path} is not valid YAML{said}.") from cause
+    if _more_values_than(values, MOST_VALUES):
+        raise error(f"{path} holds more than {MOST_VALUES} values: that is no {noun}.")
+    return values
+
+
+def _more_values_than(values: object, most: int) -> bool:
+    """True if plain values are many. Aliases let a few lines of YAML mean billions, or contain themselves."""
+    waiting, count = [values], 0
+    while waiting and count <= most:
+        value = waiting.pop()
+        count += 1
+        waiting += [*value, *value.values()] if isinstance(value, dict) else value if isinstance(value, list) else []
+    return count > most
+
+
+def check_values(kind: type[BaseModel], values: object, what: object, error: type[ErIlError]) -> None:
+    """Check what a file of others says against the class that describes what er_il needs of it.
+
+    Args:
+        kind: The class.
+        values: What the file said.
+        what: The file's path, or what else to call it.
+        error: What to raise if it says something else; names the file and what is wrong.
+    """
+    try:
+        kind.model_validate(values)
+    except ValidationError as cause:
+        raise error(f"{what} is damaged: {_message(cause, 'file', kind.model_fields)}") from cause
 
 
 def _message(cause: ValidationError, noun: str, valid: Mapping[str, Any]) -> str:
@@ -90,9 +135,9 @@ def _message(cause: ValidationError, noun: str, valid: Mapping[str, Any]) -> str
             found[each["type"]].append(where)
             continue
         text = each["msg"].removeprefix("Value error, ")
-        said.append(f"{where} is {each['input']!r}: {text}." if where else f"{text}.")
+        said.append(f"{where} is {reprlib.repr(each['input'])}: {text}." if where else f"{text}.")
     if found["missing"]:
         said.insert(0, f"The {noun} lacks {', '.join(found['missing'])}.")
     if found["extra_forbidden"]:
         said.insert(0, f"A {noun} has no {', '.join(found['extra_forbidden'])}. Valid: {', '.join(valid)}.")
-    return " ".join(said)
+    return " ".join(said[:MOST_MISTAKES])

@@ -115,7 +115,11 @@ def run_jobs[T](
 
 
 def end_with_parent() -> None:
-    """Let this process, of a program that knows nothing of us, be killed when its parent dies (on Linux)."""
+    """Let this process, of a program that knows nothing of us, be killed when its parent dies (on Linux).
+
+    Ctrl-C, which reaches the whole group, it leaves to the parent.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     if _LIBC is not None:
         _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 

@@ -10,7 +10,7 @@ import rerun as rr
 from rerun.urdf import UrdfJoint, UrdfTree
 
 from er_il.arms.arm import Arm
-from er_il.arms.urdf import find_mesh
+from er_il.arms.urdf import find_mesh, parse_urdf
 from er_il.evaluation.trace import Array
 from er_il.kinematics.solver import kinematics_of
 
@@ -73,7 +73,7 @@ def drawable_urdf(path: Path) -> str:
     Raises:
         ArmError: a mesh is missing.
     """
-    robot = ET.parse(path).getroot()
+    robot = parse_urdf(path)
     for link in robot.findall("link"):
         visuals, collisions = link.findall("visual"), link.findall("collision")
         for shape in (visuals if collisions else []) + collisions:

@@ -1,14 +1,31 @@
 """How well the adviser's ranking of ERJ's joints predicts the success of policies trained with them."""
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import BaseModel, Field, StrictInt, StrictStr
 
 from er_il.spaces.registry import split_name
+from er_il.support.declaration import check_values
 from er_il.support.errors import DatasetError
+from er_il.support.json_files import read_json
 
 KEYS = ("task", "decoder", "successes", "episodes", "interval")
+
+
+class _Cell(BaseModel):
+    task: StrictStr
+    decoder: StrictStr
+    successes: Annotated[StrictInt, Field(ge=0)]
+    episodes: Annotated[StrictInt, Field(ge=1)]
+    interval: tuple[float, float]
+
+
+class _Report(BaseModel):
+    """What is needed of a report of rollouts."""
+
+    cells: list[_Cell]
 
 
 def read_training(path: Path) -> list[dict[str, Any]]:
@@ -17,12 +34,11 @@ def read_training(path: Path) -> list[dict[str, Any]]:
     Raises:
         DatasetError: the file is no such report.
     """
-    try:
-        cells = [{key: cell[key] for key in KEYS} for cell in json.loads(path.read_text())["cells"]]
-    except FileNotFoundError as error:
-        raise DatasetError(f"There is no {path}: er-il benchmark writes it.") from error
-    except (json.JSONDecodeError, KeyError, TypeError) as error:
-        raise DatasetError(f"{path} is no report of rollouts: its cells need {', '.join(KEYS)}.") from error
+    if not path.exists():
+        raise DatasetError(f"There is no {path}: er-il benchmark writes it.")
+    report = read_json(path, DatasetError)
+    check_values(_Report, report, path, DatasetError)
+    cells = [{key: cell[key] for key in KEYS} for cell in report["cells"]]
     return [cell for cell in cells if cell["decoder"].partition("@")[0] == "erj"]
 
 
