@@ -7,6 +7,7 @@ memory. Takes the arguments of ``lerobot-train``: ``python -m er_il.policy.in_me
 
 import math
 import os
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -16,6 +17,8 @@ from lerobot.datasets import LeRobotDataset
 from lerobot.scripts import lerobot_train
 
 from datasets import Dataset
+from er_il.policy import safeguards
+from er_il.support.errors import ErIlError
 
 SHARE = 0.5  # of the free memory that images may take
 
@@ -85,7 +88,15 @@ def main() -> None:
         return both
 
     lerobot_train.make_train_eval_datasets = make_in_memory
-    lerobot_train.main()
+    safeguards.install()
+    mistake = ""
+    try:
+        lerobot_train.main()
+    except ErIlError as error:
+        mistake = str(error)
+    if mistake:  # told here, where the exception no longer holds LeRobot's progress bar: below that
+        print(f"error: {mistake}", file=sys.stderr)
+        sys.exit(2)
 
 
 if __name__ == "__main__":
