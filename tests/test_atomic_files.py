@@ -1,6 +1,7 @@
 import json
 import subprocess
 import sys
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import pytest
@@ -71,3 +72,17 @@ def test_the_folder_of_an_unfinished_run_stays_for_its_successor(tmp_path: Path)
     with work_folder(tmp_path / "out") as work:
         (work / "demo.npz").unlink()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_another_process_finished_in_between_is_left_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    def finished(target: Path) -> AbstractContextManager[Path]:
+        target.mkdir()
+        (target / "theirs").touch()
+        return work_folder(target)
+
+    monkeypatch.setattr("er_il.support.atomic_files.work_folder", finished)
+    with pytest.raises(FileExistsError), atomic_folder(tmp_path / "out"):
+        pytest.fail("written twice")
+    assert [path.name for path in tmp_path.rglob("*")] == ["out", "theirs"]

@@ -143,6 +143,9 @@ def test_a_grid_without_the_reference_is_reported_without_differences(tmp_path: 
 def test_a_folder_belongs_to_one_grid(tmp_path: Path) -> None:
     (tmp_path / "strange").mkdir()
     (tmp_path / "strange" / "thesis.tex").touch()
+    (tmp_path / "killed").mkdir()
+    (tmp_path / "killed" / "benchmark.partial-0123abcd.json").touch()  # a kill as it said whose the folder is
+    claim(grid(), tmp_path / "killed")
     with pytest.raises(ErIlError, match="something else than an experiment"):
         claim(grid(), tmp_path / "strange")
     claim(grid(), tmp_path / "mine")

@@ -24,12 +24,23 @@ from er_il.support.atomic_files import atomic_folder, work_folder
 from er_il.support.errors import DatasetError, ErIlError, UnknownNameError
 
 RECIPE = Recipe.load("lift_cup").resized(3)
+SEEN = RECIPE.resized(2).replaced(cameras=("wrist", "shoulder"), image_size=32)
 
 
 @pytest.fixture(scope="module")
 def generated(tmp_path_factory):
     out = tmp_path_factory.mktemp("data") / "lift_cup"
     return generate(RECIPE, ["joint", "erj"], out, Progress(disable=True), workers=2)
+
+
+@pytest.fixture(scope="module")
+def seen(tmp_path_factory):
+    out = tmp_path_factory.mktemp("data") / "seen"
+    return generate(SEEN, ["joint", "erj"], out, Progress(disable=True), workers=1)
+
+
+def interrupt(*_):
+    raise KeyboardInterrupt
 
 
 def _load(path):
@@ -149,16 +160,33 @@ def test_a_killed_run_resumes_with_what_it_had(generated, tmp_path):
     assert not (tmp_path / "lift_cup.partial").exists()
 
 
+def test_an_interrupted_run_gives_the_same_files(seen, tmp_path, monkeypatch):
+    ask, whole, resumed = Progress(disable=True), seen.paths["erj"].parent, tmp_path / "resumed"
+    with monkeypatch.context() as patch:
+        patch.setattr("er_il.datasets.writer.normalise_observations", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            generate(SEEN, ["joint", "erj"], resumed, ask, workers=1)
+    generate(SEEN, ["joint", "erj"], resumed, ask, workers=1)
+    files = {path.relative_to(whole) for path in whole.rglob("*") if path.is_file()}
+    assert {path.relative_to(resumed) for path in resumed.rglob("*") if path.is_file()} == files
+    for name in (file for file in files if file.parts[1] != "data"):  # whose files hold a fingerprint that is drawn
+        assert (resumed / name).read_bytes() == (whole / name).read_bytes(), name
+    assert all(_table(whole / space).equals(_table(resumed / space)) for space in ("joint", "erj"))
+
+
 def test_a_run_that_was_killed_while_encoding_resumes(generated, tmp_path):
     out = tmp_path / "lift_cup"
     shutil.copytree(generated.paths["joint"], out / "joint")
     for partial in (out / "erj.partial", out / "erj.partial" / "erj"):  # as version 0.1.0 left it, and as this one does
         shutil.copytree(generated.paths["joint"], partial)
         (partial / "meta/stats.json").unlink()
+    (tmp_path / "lift_cup.partial").mkdir()
+    (tmp_path / "lift_cup.partial" / "recipe.partial-0123abcd.json").touch()  # killed as it wrote the recipe
     resumed = generate(RECIPE, ["joint", "erj"], out, Progress(disable=True), workers=1)
     assert resumed.new == ("erj",)
     assert _table(resumed.paths["erj"]).equals(_table(generated.paths["erj"]))
     assert sorted(path.name for path in out.iterdir()) == ["erj", "joint"]
+    assert [path.name for path in tmp_path.iterdir()] == ["lift_cup"]
 
 
 def test_one_run_at_a_time(generated, tmp_path):
@@ -180,20 +208,18 @@ def test_an_unfinished_run_of_another_recipe_is_refused(tmp_path):
         generate(RECIPE, ["joint"], tmp_path / "lift_cup", Progress(disable=True), workers=1)
 
 
-def test_cameras_are_recorded_once_and_shared(tmp_path):
-    recipe = RECIPE.resized(2).replaced(cameras=("wrist", "shoulder"), image_size=32)
-    made = generate(recipe, ["joint", "erj"], tmp_path / "seen", Progress(disable=True), workers=1)
-    videos = [sorted(path.rglob("*.mp4")) for path in made.paths.values()]
+def test_cameras_are_recorded_once_and_shared(seen):
+    videos = [sorted(path.rglob("*.mp4")) for path in seen.paths.values()]
     assert len(videos[0]) == 2
     assert [video.stat().st_ino for video in videos[0]] == [video.stat().st_ino for video in videos[1]]
-    dataset = _load(made.paths["erj"])
+    dataset = _load(seen.paths["erj"])
     start = dataset.meta.episodes[1]["dataset_from_index"]
-    world = make_world(recipe)
+    world = make_world(SEEN)
     demo = record_demo(world, int(dataset[start][DEMO_SEED]), RECIPE.disturbance)
     world.close()
     assert isinstance(demo, Demo)
     for step in (0, 40, len(demo) - 1):  # video frames belong to their rows, in the second episode too
-        for camera in recipe.cameras:
+        for camera in SEEN.cameras:
             decoded = dataset[start + step][f"observation.images.{camera}"].numpy().transpose(1, 2, 0) * 255
             error = [np.abs(decoded - demo.images[camera][near]).mean() for near in (step, (step + 60) % len(demo))]
             assert error[0] < 10

@@ -1,23 +1,34 @@
 import json
+import shutil
 import sys
 from collections.abc import Iterator
+from itertools import chain, islice
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import gymnasium
 import pytest
 import torch
+import yaml
+from accelerate import Accelerator
+from lerobot.datasets import EpisodeAwareSampler, compute_sampler_state
 from lerobot.scripts import lerobot_edit_dataset, lerobot_eval, lerobot_train
 from rich.progress import Progress
+from torch.utils.data import DataLoader
 
 import er_il.policy.in_memory
 from er_il import cli
+from er_il.datasets.dataset import Dataset
 from er_il.datasets.recipe import Recipe
 from er_il.datasets.recording import generate
 from er_il.envs.tasks import task_id
 from er_il.evaluation.rollouts import evaluate
 from er_il.policy.configuration import default_config, input_features
+from er_il.policy.safeguards import cycle_where_it_was, move_last, save_finite_checkpoint, stop_at_nan
 from er_il.policy.training import Training, pretrained
-from er_il.support.errors import DatasetError, PolicyError, UnknownNameError
+from er_il.support.atomic_files import work_folder
+from er_il.support.errors import DatasetError, ErIlError, PolicyError, UnknownNameError
 
 
 @pytest.fixture
@@ -49,8 +60,36 @@ def run_in_memory(monkeypatch: pytest.MonkeyPatch, training: Training) -> None:
     """Train as ``er-il train`` does, but in this process; test_demo's trainings run in their own."""
     training.prepare()
     with monkeypatch.context() as patch:
-        patch.setattr(lerobot_train, "make_train_eval_datasets", lerobot_train.make_train_eval_datasets)  # to undo
+        for name, value in list(vars(lerobot_train).items()):
+            patch.setattr(lerobot_train, name, value)  # to undo
         run(patch, er_il.policy.in_memory.main, *training.command[1:])
+
+
+def small_config(folder: Path, **changes: object) -> Path:
+    """A policy that takes milliseconds to train, with random numbers in each step; a checkpoint after each."""
+    values = yaml.safe_load(default_config("erj").read_text())
+    values["policy"] |= {"dim_model": 16, "dim_feedforward": 16, "n_encoder_layers": 1}
+    values["policy"] |= {"use_vae": True, "n_vae_encoder_layers": 1, "dropout": 0.1}
+    path = folder / "small.yaml"
+    path.write_text(yaml.safe_dump(values | {"save_freq": 1} | changes))
+    return path
+
+
+def checkpoint_bytes(training: Training, step: int) -> dict[str, bytes]:
+    """What a checkpoint holds of the policy and the training, without what says how it came about."""
+    folder = training.out / "checkpoints" / f"{step:06d}"
+    files = {str(path.relative_to(folder)): path for path in folder.rglob("*") if path.is_file()}
+    told = {"pretrained_model/config.json", "pretrained_model/train_config.json"}
+    return {name: path.read_bytes() for name, path in files.items() if name not in told}
+
+
+def back_to(training: Training, step: int) -> None:
+    """Make it as a kill just before the next checkpoint would have left it."""
+    folder = training.out / "checkpoints"
+    for later in range(step + 1, training.steps + 1):
+        shutil.rmtree(folder / f"{later:06d}")
+    (folder / "last").unlink()
+    (folder / "last").symlink_to(f"{step:06d}")
 
 
 def test_the_command_trains_on_the_training_episodes_and_declares_the_actions(datasets: Path, tmp_path: Path):
@@ -92,20 +131,21 @@ def test_inputs_are_those_of_the_configuration_in_the_shapes_of_the_dataset(tmp_
 def test_from_demonstrations_to_a_rollout_with_the_stock_commands(
     datasets: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
-    out = tmp_path / "policy"
-    first = training(datasets, out)
-    assert first.done_steps == 0
-    run(monkeypatch, lerobot_train.main, *first.command[1:])
-    assert first.finished
-    longer = training(datasets, out, steps=4)
-    assert (longer.done_steps, longer.finished) == (2, False)
-    assert "--resume=true" in longer.command
+    frames = Dataset(datasets / "erj").episodes[1].stop  # of the two training episodes
+    config = small_config(tmp_path, batch_size=frames // 2 + 1)  # two steps an epoch
+    longer, in_memory = (training(datasets, tmp_path / name, config=config, steps=4) for name in ("stock", "own"))
+    assert (longer.done_steps, longer.finished) == (0, False)
     run(monkeypatch, lerobot_train.main, *longer.command[1:])
     assert (longer.done_steps, longer.finished) == (4, True)
-    in_memory = training(datasets, tmp_path / "in_memory", steps=2)
     run_in_memory(monkeypatch, in_memory)
-    weights = "checkpoints/000002/pretrained_model/model.safetensors"
-    assert (in_memory.out / weights).read_bytes() == (out / weights).read_bytes()
+    uninterrupted = checkpoint_bytes(longer, 4)
+    assert {"pretrained_model/model.safetensors", "training_state/rng_state.safetensors"} <= uninterrupted.keys()
+    assert checkpoint_bytes(in_memory, 4) == uninterrupted
+    back_to(in_memory, 3)  # within the second epoch: its order and its random numbers are to go on
+    assert (in_memory.done_steps, in_memory.finished) == (3, False)
+    assert "--resume=true" in in_memory.command
+    run_in_memory(monkeypatch, in_memory)
+    assert checkpoint_bytes(in_memory, 4) == uninterrupted
 
     config = json.loads((longer.policy / "train_config.json").read_text())
     assert config["dataset"]["episodes"] == [0, 1]
@@ -175,6 +215,79 @@ def test_a_checkpoint_cut_off_while_it_was_written_is_not_resumed(datasets: Path
     assert begun.done_steps == 2  # the link is missing: the newest may be incomplete
     (begun.out / "checkpoints" / "last").symlink_to("000004")
     assert begun.done_steps == 4
+
+
+def test_one_training_at_a_time(datasets: Path, tmp_path: Path):
+    begun = training(datasets, tmp_path / "out")
+    with work_folder(begun.out), pytest.raises(ErIlError, match="Another command works in"):
+        begun.run()
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("loss", "fine"), [(0.1, True), (float("nan"), False), (float("-inf"), False)])
+def test_a_loss_that_is_not_finite_ends_the_training(loss: float, fine: bool):
+    update = stop_at_nan(lambda tracker: (tracker, None))
+    tracker = SimpleNamespace(loss=SimpleNamespace(val=loss), steps=41)
+    if fine:
+        assert update(tracker) == (tracker, None)
+    else:
+        with pytest.raises(PolicyError, match=rf"diverged: the loss is {loss} at step 42\."):
+            update(tracker)
+
+
+def test_a_mistake_of_the_training_is_one_line_and_exit_code_2(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    def diverge() -> None:
+        raise PolicyError("The training diverged.")
+
+    for name, value in list(vars(lerobot_train).items()):
+        monkeypatch.setattr(lerobot_train, name, value)  # to undo
+    monkeypatch.setattr(lerobot_train, "main", diverge)
+    with pytest.raises(SystemExit) as left:
+        er_il.policy.in_memory.main()
+    assert left.value.code == 2
+    assert capsys.readouterr().err == "error: The training diverged.\n"
+
+
+def drawn(state: torch.Tensor, start: int, stop: int) -> list[tuple[list[int], float, torch.Tensor]]:
+    """The frames of each step, a random number that it draws, and the generator's state after it."""
+    sampler = EpisodeAwareSampler([0], [10], shuffle=True, seed=3)
+    torch.set_rng_state(state)
+    sampler.load_state_dict(compute_sampler_state(start, 10, 4, 1))
+    loader: Any = Accelerator(cpu=True).prepare(DataLoader(range(10), sampler=sampler, batch_size=4))  # pyright: ignore[reportArgumentType]
+    batches = islice(cycle_where_it_was(loader), stop - start)
+    return [(frames.tolist(), torch.rand(1).item(), torch.get_rng_state()) for frames in batches]
+
+
+def test_batches_and_random_numbers_go_on_as_without_an_interruption():
+    whole = drawn(torch.Generator().manual_seed(0).get_state(), 0, 8)
+    assert sorted(chain(*(frames for frames, *_ in whole[3:6]))) == list(range(10))  # three steps an epoch
+    assert whole[0][0] != whole[3][0]
+    for step in range(1, 8):
+        resumed = drawn(whole[step - 1][2], step, 8)
+        assert [each[:2] for each in resumed] == [each[:2] for each in whole[step:]]
+
+
+def test_weights_that_are_no_numbers_are_not_saved(tmp_path: Path):
+    policy = torch.nn.Linear(2, 2)
+    torch.nn.init.constant_(policy.bias, float("inf"))
+    with pytest.raises(PolicyError, match="weights are not finite at step 7"):
+        save_finite_checkpoint(step=7, policy=policy, checkpoint_dir=tmp_path / "000007")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_last_checkpoint_is_there_at_any_moment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    for step in ("000001", "000002"):
+        (tmp_path / step).mkdir()
+    move_last(tmp_path / "000001")
+    monkeypatch.setattr(Path, "rename", lambda *_: pytest.fail("killed"))
+    with pytest.raises(pytest.fail.Exception):
+        move_last(tmp_path / "000002")
+    monkeypatch.undo()
+    assert (tmp_path / "last").readlink() == Path("000001")
+    move_last(tmp_path / "000002")
+    assert (tmp_path / "last").readlink() == Path("000002")
 
 
 def test_mistakes(datasets: Path, tmp_path: Path):

@@ -28,7 +28,6 @@ def train(
         config: Configuration of the training; configs/act_<space>.yaml if omitted.
         out: Folder of the policy; policies/<task>/<space> if omitted.
     """
-    import shlex
     import sys
 
     from er_il.envs.tasks import task_id
@@ -56,7 +55,6 @@ def train(
             f"{training.policy}: trained already, for {training.done_steps} steps. Remove {training.out} to start anew."
         )
         return
-    print(shlex.join(["OMP_NUM_THREADS=1", *training.command]), flush=True)
     if code := training.run():
         sys.exit(code)
     print(training.policy)

@@ -17,7 +17,7 @@ from er_il.datasets.recipe import Recipe
 from er_il.datasets.record import DatasetRecord
 from er_il.spaces.layout import Layout
 from er_il.spaces.registry import check_space, make_arm_space
-from er_il.support.atomic_files import work_folder, write_json
+from er_il.support.atomic_files import PARTIAL, work_folder, write_json
 from er_il.support.errors import DatasetError
 
 _DEMOS, _DATASET, _RECIPE = "demos", "dataset", "recipe.json"  # in the folder of an unfinished run
@@ -66,7 +66,8 @@ def generate(recipe: Recipe, spaces: Sequence[str], out: Path, progress: Progres
             _encode(Dataset(first), out, missing, progress)
         for leftover in (work / _DEMOS, work / _DATASET):
             shutil.rmtree(leftover, ignore_errors=True)
-        (work / _RECIPE).unlink(missing_ok=True)
+        for file in (work / _RECIPE, *work.glob(f"*{PARTIAL}-*")):  # the latter of a run killed as it wrote the former
+            file.unlink(missing_ok=True)
     return Generated({space: out / space for space in asked}, new, DatasetRecord.read(first).dropped)
 
 

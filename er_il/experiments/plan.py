@@ -18,7 +18,7 @@ from er_il.experiments.grid import Cell, Grid
 from er_il.experiments.jobs import Demonstrate, RollOut, Train
 from er_il.policy.configuration import default_config, default_steps, read_config
 from er_il.policy.rows import POLICY_ROWS
-from er_il.support.atomic_files import write_json
+from er_il.support.atomic_files import PARTIAL, write_json
 from er_il.support.errors import ErIlError
 from er_il.support.folder_lock import LOCK, folder_lock
 from er_il.support.json_files import read_json
@@ -59,7 +59,8 @@ class Plan:
         """
         owner, grid = self.out / OWNER, self.grid
         found = {path.name for path in self.out.iterdir()} if self.out.exists() else set()
-        if found - {LOCK} and OWNER not in found:
+        strangers = {name for name in found - {LOCK} if PARTIAL not in name}  # a kill may come before the owner is said
+        if strangers and OWNER not in found:
             raise ErIlError(f"{self.out} holds something else than an experiment; choose another --out.")
         for task, demonstrate in self._demonstrations.items():
             for dataset in filter(Path.exists, (demonstrate.path / space for space in demonstrate.spaces)):

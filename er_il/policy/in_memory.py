@@ -17,6 +17,7 @@ from lerobot.datasets import LeRobotDataset
 from lerobot.scripts import lerobot_train
 
 from datasets import Dataset
+from er_il.policy import safeguards
 from er_il.support.failures import REPORT, explanation
 
 SHARE = 0.5  # of the free memory that images may take
@@ -87,14 +88,18 @@ def main() -> None:
         return both
 
     lerobot_train.make_train_eval_datasets = make_in_memory
+    safeguards.install()
+    mistake = None
     try:
         lerobot_train.main()
     except Exception as error:
-        if said := explanation(error):
-            print(f"error: {said}", file=sys.stderr)
-            sys.exit(2)
-        error.add_note(REPORT)
-        raise
+        mistake = explanation(error)
+        if mistake is None:
+            error.add_note(REPORT)
+            raise
+    if mistake:  # told here, where the exception no longer holds LeRobot's progress bar: below that
+        print(f"error: {mistake}", file=sys.stderr)
+        sys.exit(2)
 
 
 if __name__ == "__main__":

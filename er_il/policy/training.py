@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import shutil
 import subprocess
 import sys
@@ -19,7 +20,7 @@ from er_il.envs.contract import Contract
 from er_il.policy.configuration import input_features, named_inputs, read_config
 from er_il.spaces.registry import check_space, split_name
 from er_il.spaces.spec import action_spec
-from er_il.support.atomic_files import write_atomically
+from er_il.support.atomic_files import work_folder, write_atomically
 from er_il.support.errors import DatasetError, PolicyError
 from er_il.support.json_files import read_json
 from er_il.support.workers import ONE_THREAD, end_with_parent
@@ -139,20 +140,29 @@ class Training:
         shutil.rmtree(self.out)
 
     def run(self, output: IO[str] | None = None) -> int:
-        """Run the command, its data in memory and with one thread unless ``OMP_NUM_THREADS`` says otherwise.
+        """Print the stock command and run it, with its data in memory.
+
+        It computes with one thread unless ``OMP_NUM_THREADS`` says otherwise.
 
         Args:
             output: Where what it prints goes; to this process's own output if omitted.
 
+        Returns:
+            Its exit code.
+
         Raises:
             PolicyError: the output folder holds something else.
+            ErIlError: another process trains there.
         """
-        self.prepare()
-        command = [sys.executable, "-m", IN_MEMORY, *self.command[1:]]
-        environment = ONE_THREAD | os.environ
-        return subprocess.run(
-            command, env=environment, stdout=output, stderr=output, check=False, preexec_fn=end_with_parent
-        ).returncode
+        with work_folder(self.out):
+            self.prepare()
+            stock = self.command
+            print(shlex.join(["OMP_NUM_THREADS=1", *stock]), file=output, flush=True)
+            command = [sys.executable, "-m", IN_MEMORY, *stock[1:]]
+            environment = ONE_THREAD | os.environ
+            return subprocess.run(
+                command, env=environment, stdout=output, stderr=output, check=False, preexec_fn=end_with_parent
+            ).returncode
 
     def _renames(self, inputs: Mapping[str, Any]) -> bool:
         """True if the dataset has other inputs than the configuration names."""

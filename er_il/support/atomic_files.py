@@ -62,6 +62,7 @@ def atomic_folder(target: Path) -> Iterator[Path]:
     """
     check_absent(target)
     with work_folder(target) as work:
+        check_absent(target)  # another process may have finished it in between
         _clear(work)
         try:
             with _naming(target):
