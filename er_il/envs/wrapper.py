@@ -83,7 +83,7 @@ class ActionSpaceEnv(
         ahead, self.ahead = self.ahead, None
         self.query(action)
         if self._last is not None:
-            return after_the_end(self._last)
+            return after_the_end(self._last, self._last[0])
         commanded = self._commander.command(action, self._measured(), ahead and (ahead,))
         (arm,) = commanded.arms
         vector = commanded.vector

@@ -16,7 +16,7 @@ from er_il.support.errors import NotResetError, UnknownNameError
 from er_il.support.shapes import Shape
 from er_il.support.vectors import check_bounds, named_vector
 from sim_tasks.tasks.observation import Observer, object_pose
-from sim_tasks.tasks.placement import Area, Placement, chosen_placement
+from sim_tasks.tasks.placement import Area, Placement, read_options
 from sim_tasks.tasks.registration import Demonstrator, leader_class, registration
 from sim_tasks.tasks.rewards import Reward, total
 from sim_tasks.world.camera import PICTURE, Cameras
@@ -24,7 +24,7 @@ from sim_tasks.world.contact import contact_force
 from sim_tasks.world.geometry import world_shapes
 from sim_tasks.world.randomisation import span
 from sim_tasks.world.robot import FINGER_BODIES, RobotModel, shoulder_offset
-from sim_tasks.world.scene import scene_spec
+from sim_tasks.world.scene import BENCH_CENTRE, BENCH_SIZE, scene_spec
 
 RATE = 20  # [Hz] of control
 COLLISION_FORCE = 20.0  # [N] at which a Panda's collision reflex stops it, by its makers' default
@@ -42,7 +42,7 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
     Reward: the sum, in [0, 1], of the terms in ``info["reward_terms"]``; 1 if the goal holds.
     Every ``info`` has ``is_success`` and ``failure`` (empty while there is none) besides. Success and failure
     terminate an episode; at the step limit it is truncated, and ``failure`` names the reason. From then on the world
-    stands still and :meth:`step` repeats its last answer, without reward, until the next reset.
+    goes on, as a real one does, but the verdict stands, and there is no reward, until the next reset.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": RATE}  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -52,7 +52,7 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
     objects: ClassVar[tuple[str, ...]]  # bodies that move, in the order of environment_state
     obstacles: ClassVar[tuple[str, ...]]  # bodies that the robot must not run into
     arms: ClassVar[tuple[str, ...]] = ("panda",)  # presets that can do the task
-    area: ClassVar[Area]  # on which objects may be placed by hand
+    area: ClassVar[Area] = Area.around(BENCH_CENTRE, BENCH_SIZE)  # on which objects may be placed by hand
     start: ClassVar[tuple[float, ...]]  # (7,) [rad] of the last seven joints; the joints below them start at home
     reward: ClassVar[Reward]
 
@@ -107,7 +107,8 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
         self.action_space = gym.spaces.Box(lower.astype(np.float32), upper.astype(np.float32))
         self._action_bounds = self.action_space.low.astype(np.float64), self.action_space.high.astype(np.float64)
         self._action_names = (*self.arm.joints, "gripper")
-        self._last: Step | None = None  # of the episode that goes on; None before the first reset
+        self._last: Step | None = None  # the episode's last step, its end once it has ended; None before any reset
+        self._beyond_success = False
         self.observation_space = self._observer.space()
         self._leader_settings = leader_settings
         if leader_settings:
@@ -192,14 +193,17 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
     def reset(
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Start an episode. ``options={"state": {name: (x, y, yaw)}}`` places objects by hand.
+        """Start an episode.
 
-        They may stand beyond the range in which they are drawn, anywhere in the task's ``area``.
+        Args:
+            seed: Seed of the initial state.
+            options: ``state``, a pose (x, y, yaw) by object, places these by hand, anywhere in the task's ``area``;
+                ``beyond_success=True`` lets success be no end: the episode is judged on, to record all of it.
 
         Raises:
             ValueError: an option or object is unknown, or a pose is none; the world stays as it is.
         """
-        chosen = chosen_placement(options, self.objects, self.area)
+        chosen, self._beyond_success = read_options(options, self.objects, self.area)
         super().reset(seed=seed)
         start = self.nominal_start
         start[-len(self.start) :] += self.np_random.uniform(-self._start_range, self._start_range, len(self.start))
@@ -226,10 +230,12 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
         check_bounds(what, command, self._action_names, low, high, slack=OVERSHOOT)
         if self._last is None:
             raise NotResetError
-        if self._last[2] or self._last[3]:
-            return after_the_end(self._last)
-        self._last = self._advance(np.clip(command, low, high))
-        return self._last
+        _, _, terminated, truncated, info = self._last
+        step = self._advance(np.clip(command, low, high))
+        if truncated or (terminated and not (info["is_success"] and self._beyond_success)):
+            return after_the_end(self._last, step[0])
+        self._last = step
+        return step
 
     def _advance(self, command: Vector) -> Step:
         """Move the world on by one control period, and judge it."""

@@ -1,4 +1,4 @@
-"""Placements of a task's objects, drawn or chosen by hand."""
+"""Placements of a task's objects, drawn or chosen by hand, and the options of a reset that choose them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,12 +11,12 @@ from er_il.support.vectors import check_bounds, named_vector
 
 Placement = dict[str, tuple[float, float, float]]  # object: x, y [m], yaw [rad]
 
-STATE = "state"  # the option of a reset that places objects
+STATE, BEYOND_SUCCESS = "state", "beyond_success"  # options of a reset
 POSE = ("x", "y", "yaw")
 TURN = 2 * np.pi  # [rad] the largest yaw, either way
 
 
-class PlacementError(UnknownNameError, NumbersError):
+class OptionError(UnknownNameError, ValueError):
     """An option, or an object to place, that a task does not have."""
 
 
@@ -34,28 +34,31 @@ class Area:
         return cls((x - length / 2, x + length / 2), (y - width / 2, y + width / 2))
 
 
-def chosen_placement(options: Mapping[str, Any] | None, objects: tuple[str, ...], area: Area) -> Placement:
-    """The objects that a reset's options place by hand: ``{"state": {name: (x, y, yaw)}}``.
+def read_options(options: Mapping[str, Any] | None, objects: tuple[str, ...], area: Area) -> tuple[Placement, bool]:
+    """What a reset's options say: where objects are placed by hand, and whether the episode goes beyond success.
 
     Raises:
-        PlacementError: an option or object is unknown.
-        NumbersError: a pose is not finite or beyond the area, or no pose.
+        OptionError: an option or object is unknown.
+        NumbersError: a pose is not finite or beyond the area, or an option is of another type.
         ShapeError: a pose has not three numbers.
     """
-    for option in options or {}:
-        if option != STATE:
-            raise PlacementError("option of reset", option, [STATE])
-    state = (options or {}).get(STATE, {})
+    given = options or {}
+    for option in given:
+        if option not in (STATE, BEYOND_SUCCESS):
+            raise OptionError("option of reset", option, (STATE, BEYOND_SUCCESS))
+    state, beyond_success = given.get(STATE, {}), given.get(BEYOND_SUCCESS, False)
+    if not isinstance(beyond_success, bool):
+        raise NumbersError(f"The option {BEYOND_SUCCESS} is {beyond_success!r}, expected True or False.")
     if not isinstance(state, Mapping):
         raise NumbersError(f"The option {STATE} is {state!r}, expected a pose (x, y, yaw) by object.")
     lower, upper = np.array([area.x[0], area.y[0], -TURN]), np.array([area.x[1], area.y[1], TURN])
     placement: Placement = {}
-    for name, given in state.items():
+    for name, place in state.items():
         if name not in objects:
-            raise PlacementError("object", name, objects)
+            raise OptionError("object", name, objects)
         what = f"The pose of {name}"
-        pose = named_vector(what, given, POSE)
+        pose = named_vector(what, place, POSE)
         check_bounds(what, pose, POSE, lower, upper)
         x, y, yaw = pose.tolist()
         placement[name] = (x, y, yaw)
-    return placement
+    return placement, beyond_success

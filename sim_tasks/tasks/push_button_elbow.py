@@ -11,12 +11,11 @@ import mujoco
 import numpy as np
 
 from sim_tasks.tasks.arm_task import ArmTask
-from sim_tasks.tasks.placement import Area, Placement
+from sim_tasks.tasks.placement import Placement
 from sim_tasks.tasks.rewards import Reward, proximity
 from sim_tasks.world.contact import collision_geoms, distance, touching
 from sim_tasks.world.props import PushButton
 from sim_tasks.world.randomisation import sides
-from sim_tasks.world.scene import BENCH_CENTRE, BENCH_SIZE
 
 BUTTON, PEDESTAL = "button", "pedestal"
 ELBOW = ("panda_link2", "panda_link3", "panda_link4", "panda_link5")  # upper arm to forearm: no other link may press
@@ -34,7 +33,6 @@ class PushButtonElbow(ArmTask):
     obstacles = (PEDESTAL,)
     arms = ("panda", "panda8")
     centre = (0.18, -0.25)  # x, y [m] of the button's mean place
-    area = Area.around(BENCH_CENTRE, BENCH_SIZE)
     start = (0.25, -0.8, -0.25, -2.1, -0.2, 2.1, 0.9)  # the elbow up
     reward = Reward(approach=0.5, press=0.25, success=0.25)
 
