@@ -25,7 +25,7 @@ ENCODED = 20.0  # [m], [rad] no dimension of an arm's encoded action is larger
 LARGEST = 1e6  # no other value of a robot is larger, whatever its unit
 STILL = 0.05  # columns whose values are this small on average, in the larger unit, tell nothing of their units
 SHARE = 0.2  # of the difference between two columns that may remain once one of them is converted
-SHOWN = 10  # episodes, and dimensions of each, that a message lists
+EPISODES, DIMENSIONS = 10, 4  # that a message lists; the rest it counts
 DEGREES = np.float32(180 / np.pi)
 
 
@@ -52,7 +52,7 @@ def check_numbers(dataset: Dataset, layout: Layout, columns: Sequence[str] = (),
         DatasetError: names episodes, dimensions, values and frames.
     """
     if problems := number_problems(dataset, layout, columns, episode):
-        text = " ".join([described(problems, len(dataset.episodes)), *_causes(dataset, layout)])
+        text = " ".join([*_causes(dataset, layout), described(problems, len(dataset.episodes))])
         raise DatasetError(f"{dataset.root}: {text}")
 
 
@@ -68,12 +68,12 @@ def _causes(dataset: Dataset, layout: Layout) -> list[str]:
 def described(problems: Problems, episodes: int) -> str:
     """The problems of a dataset of so many episodes in one line."""
     listed = []
-    for number, texts in list(problems.items())[:SHOWN]:
-        more = f", and {len(texts) - SHOWN} more" if len(texts) > SHOWN else ""
-        listed.append(f"episode {number}: {', '.join(texts[:SHOWN])}{more}")
-    if len(problems) > SHOWN:
-        listed.append(f"and {len(problems) - SHOWN} more episodes")
-    return f"{len(problems)} of {episodes} episodes hold numbers that cannot be: {'; '.join(listed)}."
+    for number, texts in list(problems.items())[:EPISODES]:
+        more = f", and {len(texts) - DIMENSIONS} more" if len(texts) > DIMENSIONS else ""
+        listed.append(f"episode {number}: {', '.join(texts[:DIMENSIONS])}{more}")
+    if len(problems) > EPISODES:
+        listed.append(f"and {len(problems) - EPISODES} more episodes")
+    return f"{len(problems)} of {episodes} episodes are not sound: {'; '.join(listed)}."
 
 
 def number_problems(
@@ -85,8 +85,8 @@ def number_problems(
         read = rows[episode]
         rows = {episode: slice(0, read.stop - read.start)}
     joints = dataset.joints_column(layout)
-    wanted = dict.fromkeys([ACTION, *([joints] if joints else []), STATE, *columns])
-    values = {name: dataset.vectors(name)[read] for name in wanted if name in dataset.features}
+    wanted = {ACTION, STATE, joints, *columns} & dataset.features.keys()
+    values = {str(name): dataset.vectors(str(name))[read] for name in sorted(wanted, key=str)}
     found: Problems = {}
     for name, array in values.items():
         _add(found, _out_of_range(array, _range(dataset, layout, name, joints), rows))

@@ -12,9 +12,11 @@ from typing import IO, Any
 
 import yaml
 
+from er_il.datasets.dataset import Dataset
 from er_il.datasets.recipe import TRAIN
 from er_il.envs.contract import Contract, dataset_info
 from er_il.policy.configuration import input_features, named_inputs
+from er_il.policy.training_data import check_training_data
 from er_il.spaces.registry import check_space, split_name
 from er_il.spaces.spec import action_spec
 from er_il.support.atomic_files import write_atomically
@@ -106,14 +108,17 @@ class Training:
     def prepare(self) -> None:
         """Make ready for the command: remove what an interruption left, write what it reads.
 
-        An interruption before the first checkpoint leaves what LeRobot would stumble over. And inputs of the command
-        line do not replace those of a configuration but come on top, so that other cameras take a configuration.
+        The numbers of the dataset and its statistics are checked. An interruption before the first checkpoint leaves
+        what LeRobot would stumble over. And inputs of the command line do not replace those of a configuration but come
+        on top, so that other cameras take a configuration.
 
         Raises:
             PolicyError: the folder holds something else.
+            DatasetError: the dataset holds numbers, or statistics, that cannot be.
         """
         if self._checkpoint is not None:
             return
+        check_training_data(Dataset(self.dataset), named_inputs(self.config))
         if self.out.exists():
             self._clear()
         inputs = input_features(self.config, dataset_info(self.dataset)["features"])
