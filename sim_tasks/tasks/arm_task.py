@@ -14,11 +14,11 @@ from er_il.kinematics.solver import kinematics_of
 from er_il.support.episode_end import Step, after_the_end
 from er_il.support.errors import NotResetError, UnknownNameError
 from er_il.support.shapes import Shape
-from er_il.support.vectors import check_bounds, named_vector
 from sim_tasks.tasks.observation import Observer, object_pose
 from sim_tasks.tasks.placement import Area, Placement, read_options
 from sim_tasks.tasks.registration import Demonstrator, leader_class, registration
 from sim_tasks.tasks.rewards import Reward, total
+from sim_tasks.tasks.targets import JointTargets
 from sim_tasks.world.camera import PICTURE, Cameras
 from sim_tasks.world.contact import contact_force
 from sim_tasks.world.geometry import world_shapes
@@ -29,7 +29,6 @@ from sim_tasks.world.scene import BENCH_CENTRE, BENCH_SIZE, scene_spec
 RATE = 20  # [Hz] of control
 COLLISION_FORCE = 20.0  # [N] at which a Panda's collision reflex stops it, by its makers' default
 SUCCESS_STEPS = 5  # consecutive control steps (0.25 s) for which success must hold
-OVERSHOOT = 2 * np.pi  # [rad] by which a target may lie beyond its limit, to be clipped; degrees lie farther
 
 
 class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
@@ -103,10 +102,8 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
         self._cameras = Cameras(self.model, cameras, image_size, (visualization_height, visualization_width))
         self._observer = Observer(self.arm, self.robot, self.objects, self._cameras)
         self._steps = self._success_steps = 0
-        lower, upper = np.append(self.arm.lower, 0.0), np.append(self.arm.upper, 1.0)
-        self.action_space = gym.spaces.Box(lower.astype(np.float32), upper.astype(np.float32))
-        self._action_bounds = self.action_space.low.astype(np.float64), self.action_space.high.astype(np.float64)
-        self._action_names = (*self.arm.joints, "gripper")
+        self._targets = JointTargets(self.arm)
+        self.action_space = self._targets.space
         self._last: Step | None = None  # the episode's last step, its end once it has ended; None before any reset
         self._beyond_success = False
         self.observation_space = self._observer.space()
@@ -219,19 +216,17 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
         return observation, info
 
     def step(self, action: np.ndarray) -> Step:
-        """Servo towards joint targets for one control period; values up to ``OVERSHOOT`` beyond the Box are clipped.
+        """Servo towards joint targets for one control period; beyond the Box, up to 2 pi, they are clipped.
 
         Raises:
             ValueError: what came is no action (not finite, of another shape or type, farther beyond the Box), or no
                 episode was started. The world stays as it is.
         """
-        what, low, high = "The action", *self._action_bounds
-        command = named_vector(what, action, self._action_names)
-        check_bounds(what, command, self._action_names, low, high, slack=OVERSHOOT)
+        command = self._targets.checked(action)
         if self._last is None:
             raise NotResetError
         _, _, terminated, truncated, info = self._last
-        step = self._advance(np.clip(command, low, high))
+        step = self._advance(command)
         if truncated or (terminated and not (info["is_success"] and self._beyond_success)):
             return after_the_end(self._last, step[0])
         self._last = step
