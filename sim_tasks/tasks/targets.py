@@ -22,7 +22,7 @@ class JointTargets:
         """An action, clipped to the limits.
 
         Raises:
-            NumbersError: it holds no real numbers, or some that are not finite or more than ``OVERSHOOT`` out of limits.
+            NumbersError: it holds no real numbers, or some not finite or more than ``OVERSHOOT`` beyond their limits.
             ShapeError: it has another shape.
         """
         targets = named_vector("The action", action, self._names)
