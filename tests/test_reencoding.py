@@ -258,8 +258,6 @@ def _mistake(monkeypatch, *arguments):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ((), "of the joint values are outside panda's limits"),
-        ((), "It looks like wrong units: the values are degrees, not radians (--units deg)"),
         (("--arm", "xarm7", "--units", "deg"), "It looks like the wrong arm: the values fit panda (--arm panda)"),
         (("--joints", *reversed(LEFT_JOINTS), "--units", "deg"), f"by their names it is --joints {LEFT_JOINTS[0]}"),
     ],
@@ -270,6 +268,16 @@ def test_mistakes_about_the_arm_are_told_apart(places, tmp_path, monkeypatch, ca
     assert message in error
     assert len(error.splitlines()) == 1
     assert (tmp_path / "report/report.json").exists()
+
+
+def test_degrees_are_not_encoded_as_radians(places, tmp_path, monkeypatch, capsys):
+    options = ("--arm", "panda", "--joints", *LEFT_JOINTS, "--out", tmp_path / "out")
+    _mistake(monkeypatch, "encode", places / "source", "--to", "erj", *options)
+    error = capsys.readouterr().err.strip()
+    assert "of the joint values are outside panda's limits" in error
+    assert "It looks like wrong units: the values are degrees, not radians (--units deg)" in error
+    assert "episode 2: action left_joint" in error and len(error.splitlines()) == 1
+    assert not (tmp_path / "out").exists()
 
 
 def test_commands_that_cannot_work_are_one_line(places, tmp_path, monkeypatch, capsys):

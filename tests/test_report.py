@@ -284,11 +284,12 @@ def verified(count: int) -> Verification:
             conditioning=np.full((count, 1), 0.1 + number),
             position_error=np.zeros((count, 1)),
             rotation_error=np.zeros((count, 1)),
+            broken=np.zeros((count, 1), dtype=bool),
         )
         for number in range(2)
     )
     layout = Layout.of_space(make_arm_space("erj", Arm.preset("panda")))
-    return Verification(layout, episodes, compared=True, findings={}, other_side={})
+    return Verification(layout, episodes, compared=True, findings={}, other_side={}, problems={})
 
 
 def test_the_figure_of_a_verification_tells_flagged_frames_apart() -> None:

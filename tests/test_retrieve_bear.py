@@ -73,7 +73,7 @@ def test_only_the_hands_pose_fails_among_clutter_and_does_without(world: Retriev
 
 
 def test_a_demonstration_goes_on_beyond_success_and_a_bear_let_go_is_dropped(world: RetrieveBear) -> None:
-    world.reset(seed=0)
+    world.reset(seed=0, options={"beyond_success": True})
     actions = list(world.leader(0))
     assert play(world, actions[:-5]) == "success"
     assert world.object_pose("bear")[2] > world.support + world.lift_height

@@ -38,7 +38,7 @@ def play(world: ArmTask, actions: Iterable[np.ndarray]) -> tuple[np.ndarray, lis
 def test_the_reward_rises_along_every_demonstration_to_one(task_id: str) -> None:
     world = make(task_id)
     for seed in SEEDS:
-        _, start = world.reset(seed=seed)
+        _, start = world.reset(seed=seed, options={"beyond_success": True})
         rewards, infos = play(world, world.leader(seed))
         rewards = np.append(sum(start["reward_terms"].values()), rewards)
         assert rewards[0] < 0.25
@@ -53,7 +53,7 @@ def test_the_reward_rises_along_every_demonstration_to_one(task_id: str) -> None
 @pytest.mark.parametrize("task_id", IDS)
 def test_the_terms_are_weighted_shares_that_sum_to_the_reward(task_id: str) -> None:
     world = make(task_id)
-    _, start = world.reset(seed=0)
+    _, start = world.reset(seed=0, options={"beyond_success": True})
     rewards, infos = play(world, world.leader(0))
     for reward, terms in [(sum(start["reward_terms"].values()), start["reward_terms"])] + [
         (reward, info["reward_terms"]) for reward, info in zip(rewards, infos, strict=True)
@@ -71,7 +71,7 @@ def test_random_and_idle_policies_get_clearly_less(task_id: str) -> None:
     world = make(task_id)
     rng = np.random.default_rng(0)
     for seed in range(3):
-        _, start = world.reset(seed=seed)
+        _, start = world.reset(seed=seed, options={"beyond_success": True})
         initial = sum(start["reward_terms"].values())
         idle, infos = play(world, [np.append(world.joint_positions, 1.0)] * world.max_steps)
         assert infos[-1]["failure"] in ("timeout", "not_pressed")
@@ -86,7 +86,7 @@ def test_random_and_idle_policies_get_clearly_less(task_id: str) -> None:
 @pytest.mark.parametrize("task_id", IDS)
 def test_the_reward_depends_on_the_state_and_not_on_time(task_id: str) -> None:
     world = make(task_id)
-    _, start = world.reset(seed=0)
+    _, start = world.reset(seed=0, options={"beyond_success": True})
     still = np.append(world.joint_positions, 1.0)
     _, infos = play(world, [still] * 40)
     assert infos[-1]["reward_terms"] == pytest.approx(start["reward_terms"], abs=0.005)

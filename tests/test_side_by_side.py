@@ -10,7 +10,7 @@ from lerobot.envs.utils import FreezeAfterEpisodeEnd
 from er_il.control.commander import DecodedAhead
 from er_il.envs.decoders import DECODERS
 from er_il.envs.lerobot_plugin import ErIlEnvConfig
-from er_il.envs.side_by_side import BATCH_FROM, BatchDecodingEnv
+from er_il.envs.side_by_side import BATCH_FROM, BatchDecodingEnv, SideBySideEnv
 from er_il.envs.wrapper import ActionSpaceEnv, make_action_space_env
 from er_il.evaluation.rollouts import POLICY_ROWS
 
@@ -67,7 +67,7 @@ def test_what_was_decoded_before_a_reset_is_forgotten() -> None:
 
 def test_so_many_that_a_batch_is_faster_decode_together() -> None:
     assert BATCH_FROM > POLICY_ROWS  # outcomes of er-il eval do not depend on how many run side by side
-    for count, kind in ((BATCH_FROM - 1, SyncVectorEnv), (BATCH_FROM, BatchDecodingEnv)):
+    for count, kind in ((BATCH_FROM - 1, SideBySideEnv), (BATCH_FROM, BatchDecodingEnv)):
         env = ErIlEnvConfig(task="lift_cup", action_space="erj").create_envs(count)["er_il"][0]
         assert type(env) is kind
         assert all(

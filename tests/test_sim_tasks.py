@@ -222,6 +222,6 @@ def test_a_leader_whose_plan_is_blocked_draws_another(seed: int) -> None:
 
 def test_a_cup_that_cannot_be_reached_has_no_plan() -> None:
     env, world = make("sim_tasks/ReachCup-v0")
-    env.reset(seed=0, options={"state": {"cup": (0.72, 0.3, 0.0)}})  # in the cabinet's side
+    env.reset(seed=0, options={"state": {"cup": (0.80, 0.165, 0.0)}})  # in its corner
     with pytest.raises(PlanError, match=r"^None of 10 plans is feasible\. The last: No collision-free elbow near "):
         world.leader(0)

@@ -13,6 +13,7 @@ from PIL import Image
 from er_il.datasets.recipe import Recipe
 from sim_tasks import TASKS, TaskEntry
 from sim_tasks.tasks.arm_task import RATE, ArmTask
+from sim_tasks.tasks.placement import Area
 
 BLOCK = 10  # [px] side of the blocks in which pictures are compared
 SAME = 14  # largest mean difference of a block between a picture and its compressed copy; an object moved by 2 cm: 20
@@ -71,13 +72,16 @@ def test_the_pictures_of_a_task_are_those_of_its_demonstration(tmp_path: Path):
         ("PushButtonElbow", "shoulder", "button", 0.03),
     ],
 )
-def test_a_camera_sees_an_object_where_it_is(task: str, camera: str, name: str, height: float):
+def test_a_camera_sees_an_object_where_it_is(
+    monkeypatch: pytest.MonkeyPatch, task: str, camera: str, name: str, height: float
+):
     world = gymnasium.make(f"sim_tasks/{task}-v0", cameras=(camera,), image_size=IMAGE).unwrapped
     assert isinstance(world, ArmTask)
     image = world.reset(seed=0)[0]["pixels"][camera].astype(int)
     axis = world.object_pose(name)[:3] + np.linspace(0, height, 20)[:, None] * [0, 0, 1]
     expected = project(world, camera, axis)
     expected = expected[np.all((expected >= 0) & (expected < IMAGE), axis=1)]
+    monkeypatch.setattr(type(world), "area", Area.around(FAR_AWAY[:2], (1.0, 1.0)))
     without = world.reset(seed=0, options={"state": {name: FAR_AWAY}})[0]["pixels"][camera].astype(int)
     seen = np.argwhere(np.abs(image - without).max(axis=2) > 20) + 0.5
     gaps = np.linalg.norm(expected[:, None] - seen, axis=2).min(axis=1)

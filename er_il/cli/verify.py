@@ -11,12 +11,15 @@ def verify(dataset: Positional[str], *, out: Path | None = None) -> None:
     """Decode a dataset's actions and compare them with the joint values that were encoded.
 
     Prints errors of the round trip, frames that cannot be decoded, and frames near singularities.
-    Joint values that look like another arm's, or in another order or other units, are an error.
+    Joint values that look like another arm's, or in another order or other units, are an error. Numbers that cannot
+    be, and frames that do not come back though nothing flags them, end it with exit code 1.
 
     Args:
         dataset: Folder of the dataset, or its repository id on the hub.
         out: Folder of report.json and round_trip.png; outputs/verify/<dataset> if omitted.
     """
+    import sys
+
     from rich.console import Console
     from rich.markup import escape
 
@@ -32,6 +35,7 @@ def verify(dataset: Positional[str], *, out: Path | None = None) -> None:
     check_writable(target)
     folder = find_dataset(dataset)
     _ = Dataset(folder).layout  # seconds of imports follow: mistakes are told before
+    from er_il.datasets.number_checks import described
     from er_il.datasets.verification import verify as verify_dataset
     from er_il.report.tables import terminal_table
     from er_il.report.text import sentences, table
@@ -49,5 +53,9 @@ def verify(dataset: Positional[str], *, out: Path | None = None) -> None:
     for note in sentences("verification.txt.j2", **report):
         console.print(escape(note), highlight=False, soft_wrap=True)
     write_study(report, target, console, {"round_trip.png": lambda _: verification_figure(verification, dataset)})
-    if verification.findings:
-        raise DatasetError(" ".join(f"{label}: {text}" for label, text in verification.findings.items()))
+    findings = [f"{label}: {text}" for label, text in verification.findings.items()]
+    if broken := verification.broken():
+        print(" ".join(["error:", described(broken, len(verification.episodes)), *findings]), file=sys.stderr)
+        sys.exit(1)
+    if findings:
+        raise DatasetError(" ".join(findings))

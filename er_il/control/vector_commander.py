@@ -10,6 +10,7 @@ from er_il.arms.arm import Vector
 from er_il.control.commander import BEST_EFFORT, Command, Commander, DecodedAhead
 from er_il.spaces.layout import Layout
 from er_il.support.errors import ErIlError, ShapeError
+from er_il.support.vectors import named_vector
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,7 @@ class VectorCommander:
             ahead: Each arm's action, if it is decoded already.
 
         Raises:
+            NumbersError: the action holds anything but real numbers; NaN and infinity are numbers.
             ShapeError: a vector has another length.
             ErIlError: nothing finite was ever commanded or measured of a dimension that belongs to no arm.
         """
@@ -87,12 +89,10 @@ class VectorCommander:
         """Split an encoded vector into each arm's action (dim,) and the other dimensions.
 
         Raises:
+            NumbersError: it holds anything but real numbers.
             ShapeError: it has another length.
         """
-        encoded, names = np.asarray(action, dtype=np.float64), self.layout.encoded_names
-        if encoded.shape != (len(names),):
-            raise ShapeError("The policy's action", encoded.shape, f"({len(names)},): {', '.join(names)}")
-        return self.layout.split_encoded(encoded)
+        return self.layout.split_encoded(named_vector("The policy's action", action, self.layout.encoded_names))
 
     def split_measured(self, measured: ArrayLike) -> tuple[list[Vector], Vector]:
         """Split measured values (D,) into each arm's angles (n,) [rad] and the other dimensions.

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from er_il.datasets.disturbance import disturbances
 from er_il.datasets.recipe import Recipe
-from er_il.envs.protocol import demonstrable_env
+from er_il.envs.protocol import BEYOND_SUCCESS, demonstrable_env
 from er_il.envs.tasks import task_id
 from er_il.support.atomic_files import write_arrays
 from er_il.support.counts import tally
@@ -79,7 +79,7 @@ def record_demo(world: gymnasium.Env[Any, Any], seed: int, disturbance: float = 
     It goes on to the leader's end, beyond the moment of success: from a demonstration that breaks off
     there, a policy learns to stop just short of it.
     """
-    observation, info = world.reset(seed=seed)
+    observation, info = world.reset(seed=seed, options={BEYOND_SUCCESS: True})
     rows: list[tuple[Any, Floats]] = []
     try:
         script = np.array(list(demonstrable_env(world).leader(seed)))

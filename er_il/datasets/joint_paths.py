@@ -9,6 +9,7 @@ import numpy as np
 from er_il.arms.arm import Arm
 from er_il.datasets.dataset import Dataset
 from er_il.datasets.decoding import decode_episodes, read_encoded_episodes
+from er_il.datasets.number_checks import check_numbers
 from er_il.datasets.wiring import Wiring, wire
 from er_il.spaces.base import Array
 from er_il.support.errors import DatasetError
@@ -46,12 +47,14 @@ def read_joint_paths(root: Path, wirings: Sequence[Wiring] = (), workers: int = 
         workers: Processes that decode, where the joints were not kept beside the encoded actions.
 
     Raises:
-        ErIlError: it is no dataset, or does not say which arm it is of and nor do the wirings.
+        ErIlError: it is no dataset, or does not say which arm it is of and nor do the wirings, or its
+            numbers cannot be.
     """
     dataset = Dataset(root)
     if not dataset.specified and not wirings:
         raise DatasetError(f"{root} does not say which arm it is of: give --arm, and --joints for its joints.")
     layout = dataset.layout if dataset.specified else wire(wirings, dataset.features, "joint", "quat")
+    check_numbers(dataset, layout)
     truth = dataset.joints_column(layout)
     episodes = read_encoded_episodes(dataset, layout, truth)
     if truth is None:

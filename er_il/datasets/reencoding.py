@@ -9,6 +9,7 @@ from typing import Any
 from er_il.datasets.dataset import Dataset
 from er_il.datasets.hub import find_dataset
 from er_il.datasets.integrity import check_whole
+from er_il.datasets.number_checks import check_numbers
 from er_il.datasets.wiring import Wiring, wire
 from er_il.spaces.joint import JOINT
 from er_il.spaces.layout import Layout
@@ -67,6 +68,7 @@ def reencode(
     check_outside(target, dataset.root)
     check_writable(target)
     check_whole(dataset)
+    check_numbers(dataset, layout if not encoded else dataset.layout)
     from er_il.datasets import card  # LeRobot: seconds of imports; mistakes are told before
     from er_il.datasets.encoding import decode_dataset, encode_dataset
 

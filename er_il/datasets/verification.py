@@ -12,20 +12,23 @@ from numpy.typing import NDArray
 from er_il.datasets.dataset import Dataset
 from er_il.datasets.decoding import DecodedEpisode, EncodedEpisode, decode_episodes, read_encoded_episodes
 from er_il.datasets.integrity import check_whole
+from er_il.datasets.number_checks import Problems, number_problems
 from er_il.datasets.sanity_checks import JointSample, check_joint_values
 from er_il.datasets.schema import STATE
+from er_il.kinematics.goal import POSITION_TOLERANCE, ROTATION_TOLERANCE
 from er_il.kinematics.rotation import Quaternion
 from er_il.kinematics.search import at_limits
 from er_il.kinematics.solver import Status
 from er_il.spaces.joint_choice import singular_intervals
-from er_il.spaces.layout import Layout
-from er_il.spaces.pose import POSITION_NAMES, PoseSpace
-from er_il.spaces.round_trip import SINGULAR
+from er_il.spaces.layout import Layout, Part
+from er_il.spaces.pose import POSITION_NAMES, TASK, PoseSpace
+from er_il.spaces.round_trip import EXACT, SINGULAR
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 PERCENTILES = (50, 95, 99, 100)
+PROMISED = 2.0  # the tolerances of the decoder within which task space returns a pose: encoding rounds, too
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +42,7 @@ class CheckedEpisode:
     conditioning: Array  # (T, P)
     position_error: Array  # (T, P) [m]
     rotation_error: Array  # (T, P) [rad]
+    broken: Flags  # (T, P) not flagged, and yet the decoder does not return what the space promises
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +54,7 @@ class Verification:
     compared: bool  # True if the dataset holds the joint vectors to compare with
     findings: dict[str, str]  # arm -> what is wrong with its joint values
     other_side: dict[str, float]  # arm -> share of quaternions beyond the hemisphere of their reference
+    problems: Problems  # numbers that cannot be
 
     @property
     def arms(self) -> tuple[str, ...]:
@@ -77,6 +82,15 @@ class Verification:
             if set(counter) != {Status.OK}
         }
 
+    def broken(self) -> Problems:
+        """What is not as the specification promises: numbers that cannot be, round trips that are not exact."""
+        found = {number: list(texts) for number, texts in self.problems.items()}
+        for each in self.episodes:
+            for arm, label in enumerate(self.arms):
+                if count := int(each.broken[:, arm].sum()):
+                    found.setdefault(each.number, []).append(f"{label} does not come back in {count} frames")
+        return dict(sorted(found.items()))
+
     def report(self) -> dict[str, Any]:
         """Everything as JSON."""
         arms = {}
@@ -89,6 +103,7 @@ class Verification:
                 "position_error": _percentiles(self.gathered("position_error")[arm]),
                 "rotation_error": _percentiles(self.gathered("rotation_error")[arm]),
                 "flagged": int(sum(each.flagged[:, arm].sum() for each in self.episodes)),
+                "broken": int(sum(each.broken[:, arm].sum() for each in self.episodes)),
                 "quaternions_other_side": self.other_side.get(label, 0.0),
                 "finding": self.findings.get(label, ""),
             }
@@ -97,6 +112,7 @@ class Verification:
             "episodes": len(self.episodes),
             "arms": arms,
             "invalid_by_episode": self.invalid(),
+            "broken_by_episode": self.broken(),
             "near_singularity": [
                 {"episode": each.number, "arm": label} | vars(interval)
                 for each in self.episodes
@@ -125,6 +141,7 @@ def verify(root: Path, workers: int, on_progress: Callable[[int, int], object]) 
     check_whole(dataset)
     truth = dataset.joints_column(layout)
     episodes = read_encoded_episodes(dataset, layout, truth)
+    problems = number_problems(dataset, layout)
     findings = _findings(dataset, layout, episodes)
     done = 0
 
@@ -135,7 +152,7 @@ def verify(root: Path, workers: int, on_progress: Callable[[int, int], object]) 
 
     decoded = decode_episodes(layout, episodes, workers, advance)
     checked = tuple(_check(layout, *each) for each in zip(episodes, decoded, strict=True))
-    return Verification(layout, checked, truth is not None, findings, _other_side(layout, episodes))
+    return Verification(layout, checked, truth is not None, findings, _other_side(layout, episodes), problems)
 
 
 def _check(layout: Layout, episode: EncodedEpisode, decoded: DecodedEpisode) -> CheckedEpisode:
@@ -148,6 +165,7 @@ def _check(layout: Layout, episode: EncodedEpisode, decoded: DecodedEpisode) -> 
         if episode.truth is not None:
             error[:, p] = np.abs(q - layout.angles(part, episode.truth)).max(axis=1)
     flagged = (decoded.status != Status.OK) | (decoded.conditioning < SINGULAR) | at_limit
+    kept = np.stack([_kept(layout, part, episode, decoded, error[:, p]) for p, part in enumerate(layout.parts)], axis=1)
     return CheckedEpisode(
         episode.number,
         decoded.status,
@@ -156,7 +174,23 @@ def _check(layout: Layout, episode: EncodedEpisode, decoded: DecodedEpisode) -> 
         decoded.conditioning,
         decoded.position_error,
         decoded.rotation_error,
+        ~(flagged | kept),
     )
+
+
+def _kept(layout: Layout, part: Part, episode: EncodedEpisode, decoded: DecodedEpisode, error: Array) -> Flags:
+    """Frames (T,) that decode to what a space promises: the joints that were encoded; task space, their pose."""
+    if episode.truth is None:
+        return np.ones(len(error), dtype=bool)
+    if not part.space.kind.endswith(TASK):
+        return error <= EXACT
+    found, meant = (
+        part.space.kinematics.fk_batch(layout.angles(part, vectors)) for vectors in (decoded.vectors, episode.truth)
+    )
+    turn = np.einsum("tij,tij->t", found[:, :3, :3], meant[:, :3, :3])  # trace of the relative rotation
+    angle = np.arccos(np.clip((turn - 1) / 2, -1.0, 1.0))
+    apart = np.linalg.norm(found[:, :3, 3] - meant[:, :3, 3], axis=1)
+    return (apart <= PROMISED * POSITION_TOLERANCE) & (angle <= PROMISED * ROTATION_TOLERANCE)
 
 
 def _other_side(layout: Layout, episodes: list[EncodedEpisode]) -> dict[str, float]:

@@ -7,7 +7,7 @@ from multiprocessing import get_context
 from typing import Any
 
 import gymnasium
-from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv, VectorEnv
+from gymnasium.vector import AutoresetMode, VectorEnv
 from lerobot.configs import FeatureType, PolicyFeature, parser
 from lerobot.envs import EnvConfig
 from lerobot.envs.utils import freeze_after_episode_end
@@ -17,7 +17,7 @@ from er_il.arms.arm import Arm
 from er_il.control.commander import BEST_EFFORT, check_answer
 from er_il.envs.contract import check_policy
 from er_il.envs.decoders import NEAREST, Decoder
-from er_il.envs.side_by_side import BATCH_FROM, BatchDecodingEnv
+from er_il.envs.side_by_side import BATCH_FROM, BatchDecodingEnv, ProcessesEnv, SideBySideEnv
 from er_il.envs.tasks import task_id
 from er_il.envs.wrapper import ActionSpaceEnv, make_action_space_env
 from er_il.spaces.base import ArmSpace
@@ -115,11 +115,11 @@ class ErIlEnvConfig(EnvConfig):
             # where each would spend seconds and half a gigabyte on its own.
             command = [name for name in sys.modules if name.startswith("lerobot.scripts.")]
             get_context("forkserver").set_forkserver_preload([*command, __name__])
-            vector = AsyncVectorEnv(factories, context="forkserver", autoreset_mode=AutoresetMode.NEXT_STEP)
+            vector = ProcessesEnv(factories, context="forkserver", autoreset_mode=AutoresetMode.NEXT_STEP)
         elif n_envs >= BATCH_FROM:
             vector = BatchDecodingEnv(factories)
         else:
-            vector = SyncVectorEnv(factories, autoreset_mode=AutoresetMode.NEXT_STEP)
+            vector = SideBySideEnv(factories, autoreset_mode=AutoresetMode.NEXT_STEP)
         return {self.type: {0: vector}}
 
 

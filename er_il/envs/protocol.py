@@ -11,6 +11,8 @@ from er_il.arms.arm import Arm, Vector
 from er_il.support.errors import ErIlError
 from er_il.support.shapes import Shape
 
+BEYOND_SUCCESS = "beyond_success"
+
 
 @runtime_checkable
 class ArmEnv(Protocol):
@@ -55,7 +57,11 @@ class ArmEnv(Protocol):
 
 @runtime_checkable
 class DemonstrableEnv(ArmEnv, Protocol):
-    """An arm environment with a scripted leader."""
+    """An arm environment with a scripted leader.
+
+    A recording goes on to the leader's end: it resets with ``options={"beyond_success": True}``, after which success
+    must neither stop the world nor the judgement of it.
+    """
 
     def leader(self, seed: int) -> Iterator[NDArray[np.float64]]:
         """The actions (n + 1,) of a demonstration of the episode just reset, one a control period.

@@ -14,7 +14,10 @@ from er_il.envs.protocol import arm_env
 from er_il.envs.tasks import task_id
 from er_il.spaces.base import ArmSpace
 from er_il.spaces.layout import Layout
+from er_il.support.episode_end import Step, after_the_end
+from er_il.support.errors import NotResetError
 
+LEROBOT_OPTIONS = "lerobot_"  # with which the options begin that LeRobot gives a reset
 INVALID_ACTION = "invalid_action"  # the failure of an episode that an invalid action stopped
 
 
@@ -26,6 +29,11 @@ class ActionSpaceEnv(
     The action's Box is that of the space: finite for deltas. ``info`` gains, at every step, ``command`` (n,) [rad]
     as sent to the arm, ``decode_status`` (a :class:`er_il.Status` value) and ``joint_step`` [rad], the largest joint
     change asked for; ``tally`` sums the episode up.
+
+    Numbers that mean nothing (NaN, infinity) are a policy's answer: the step is taken with the status ``invalid``, and
+    ``on_invalid`` says what the arm does. What is no vector of numbers of the space's shape is a mistake of the
+    program: :meth:`step` refuses it, and the world stays as it is. Once an episode has ended, :meth:`step` repeats its
+    last answer, without reward, until the next reset.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], space: ArmSpace, on_invalid: str = BEST_EFFORT) -> None:
@@ -37,6 +45,8 @@ class ActionSpaceEnv(
         layout = Layout.of_space(space)
         self._commander = VectorCommander(layout, 1.0 / env.metadata["render_fps"], on_invalid)
         self.ahead: DecodedAhead | None = None  # the next step's action, if it is decoded already
+        self._last: Step | None = None  # of the episode that goes on
+        self._started = False
         low, high = (np.append(bound, opening) for bound, opening in zip(space.bounds, (0.0, 1.0), strict=True))
         self.action_space = gymnasium.spaces.Box(low.astype(np.float32), high.astype(np.float32))
 
@@ -46,26 +56,46 @@ class ActionSpaceEnv(
         return self._commander.arms[0].tally
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        observation, info = self.env.reset(seed=seed, options=options)
+        """Start an episode; LeRobot's own options are for its wrappers and end here."""
+        own = {name: value for name, value in (options or {}).items() if not name.startswith(LEROBOT_OPTIONS)}
+        observation, info = self.env.reset(seed=seed, options=own)
         self._commander.reset(self._measured())
-        self.ahead = None
+        self.ahead, self._last, self._started = None, None, True
         return observation, info
 
     def query(self, action: ArrayLike) -> tuple[Vector, Vector, Vector]:
-        """The arm's part (dim,) of an action, the measured joints and the last command (n,) [rad] to decode it from."""
+        """The arm's part (dim,) of an action, the measured joints and the last command (n,) [rad] to decode it from.
+
+        Raises:
+            ValueError: as :meth:`step`.
+        """
         (own,), _ = self._commander.split_action(action)
+        if not self._started:
+            raise NotResetError
         return own, self.world.joint_positions, self._commander.arms[0].last
 
     def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Decode an action, and take the step that it commands.
+
+        Raises:
+            ValueError: what came is no vector of the space's dimensions, or no episode was started.
+        """
         ahead, self.ahead = self.ahead, None
+        self.query(action)
+        if self._last is not None:
+            return after_the_end(self._last, self._last[0])
         commanded = self._commander.command(action, self._measured(), ahead and (ahead,))
         (arm,) = commanded.arms
-        observation, reward, terminated, truncated, info = self.env.step(commanded.vector.astype(np.float32))
+        vector = commanded.vector
+        vector[-1] = np.clip(vector[-1], 0.0, 1.0)  # the gripper's opening, which is passed through
+        observation, reward, terminated, truncated, info = self.env.step(vector.astype(np.float32))
         info = info | {"command": arm.q, "decode_status": str(arm.status), "joint_step": arm.joint_step}
         if arm.stopped and not info["is_success"]:
             terminated = True
             info["failure"] = INVALID_ACTION
-        return observation, float(reward), terminated, truncated, info
+        step = observation, float(reward), terminated, truncated, info
+        self._last = step if terminated or truncated else None
+        return step
 
     def _measured(self) -> Vector:
         return np.append(self.world.joint_positions, self.world.gripper_opening)

@@ -18,6 +18,7 @@ from er_il.datasets.integrity import check_whole
 from er_il.datasets.recipe import TRAIN
 from er_il.envs.contract import Contract
 from er_il.policy.configuration import input_features, named_inputs, read_config
+from er_il.policy.training_data import check_training_data
 from er_il.spaces.registry import check_space, split_name
 from er_il.spaces.spec import action_spec
 from er_il.support.atomic_files import work_folder, write_atomically
@@ -116,18 +117,21 @@ class Training:
     def prepare(self) -> None:
         """Make ready for the command: remove what an interruption left, write what it reads.
 
-        An interruption before the first checkpoint leaves what LeRobot would stumble over. And inputs of the command
-        line do not replace those of a configuration but come on top, so that other cameras take a configuration.
+        The numbers of the dataset and its statistics are checked. An interruption before the first checkpoint leaves
+        what LeRobot would stumble over. And inputs of the command line do not replace those of a configuration but come
+        on top, so that other cameras take a configuration.
 
         Raises:
             PolicyError: the folder holds something else.
+            DatasetError: the dataset holds numbers, or statistics, that cannot be.
         """
         if self._checkpoint is not None:
             return
-        if self.out.exists():
-            self._clear()
         dataset = Dataset(self.dataset)
         check_whole(dataset)
+        check_training_data(dataset, named_inputs(self.config))
+        if self.out.exists():
+            self._clear()
         inputs = input_features(self.config, dataset.features)
         if self._renames(inputs):
             values = read_config(self.config)

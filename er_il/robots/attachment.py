@@ -9,8 +9,12 @@ there the environment decodes.
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+from safetensors import safe_open
+
 from er_il.control.commander import BEST_EFFORT
 from er_il.datasets.dataset import Dataset
+from er_il.datasets.number_checks import check_numbers
 from er_il.datasets.schema import STATE
 from er_il.envs.contract import decodes, read_policy_config
 from er_il.envs.trust import check_steps
@@ -21,6 +25,9 @@ from er_il.support.atomic_files import check_absent, check_outside, check_writab
 from er_il.support.errors import ErIlError, PolicyError, ShapeError
 from er_il.support.json_files import read_json
 from er_il.support.links import check_links
+
+FASTEST = 1000  # [Hz] of any arm's control
+FLOATS = ("F16", "F32", "F64")  # weights in other formats are left to LeRobot
 
 if TYPE_CHECKING:
     from er_il.robots.processors import DecodePolicyAction
@@ -52,10 +59,11 @@ def attach(
         The step that decodes.
 
     Raises:
-        PolicyError: there is no policy, it decodes already, is not trusted, or does not say where its dataset is.
-        DatasetError: there is no dataset, or it does not say what its actions mean.
+        PolicyError: there is no policy, it decodes already, is not trusted, does not say where its dataset is, or its
+            weights are not finite.
+        DatasetError: there is no dataset, it does not say what its actions mean, or its numbers cannot be.
         ShapeError: the policy was not trained on this dataset.
-        ErIlError: the rate is not positive, or there is no such answer to invalid actions.
+        ErIlError: the rate is not positive or above ``FASTEST``, or there is no such answer to invalid actions.
         FileExistsError: ``out`` exists.
     """
     source = pretrained(policy)
@@ -65,10 +73,13 @@ def attach(
     if decodes(source):
         raise PolicyError(f"The policy {source} decodes its actions already.")
     trained_on = Dataset(dataset or _trained_on(source))
-    if fps is not None and not fps > 0:
-        raise ErIlError(f"The rate of control is {fps} Hz; it must be positive.")
-    period = 1.0 / (trained_on.fps if fps is None else fps)
+    rate = trained_on.fps if fps is None else fps
+    if not (isinstance(rate, int | float) and 0 < rate <= FASTEST):
+        raise ErIlError(f"The rate of control is {rate} Hz; it must be positive, and at most {FASTEST} Hz.")
+    period = 1.0 / rate
     RobotCommander(trained_on.layout, period, on_invalid)  # raises what building the step would
+    check_numbers(trained_on, trained_on.layout)
+    _check_weights(source)
     _check_shape(source, trained_on.features[ACTION]["shape"])
     check_absent(out)
     check_outside(out, source)
@@ -76,6 +87,15 @@ def attach(
     from er_il.robots.policy_copy import write_copy  # LeRobot: seconds of imports; mistakes are told before
 
     return write_copy(source, out, trained_on.spec, period, on_invalid, trained_on.names(STATE))
+
+
+def _check_weights(policy: Path) -> None:
+    """Refuse a policy with weights, or statistics to normalise by, that are not finite."""
+    for path in sorted(policy.glob("*.safetensors")):
+        with safe_open(path, framework="numpy") as file:
+            for name in file.keys():  # noqa: SIM118  it is no mapping
+                if file.get_slice(name).get_dtype() in FLOATS and not np.isfinite(file.get_tensor(name)).all():
+                    raise PolicyError(f"The policy {policy} is damaged: {name} in {path.name} holds NaN or infinity.")
 
 
 def _trained_on(policy: Path) -> Path:

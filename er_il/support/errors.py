@@ -29,6 +29,17 @@ class ShapeError(ErIlError, ValueError):
         super().__init__(f"{what} has shape {got}, expected {expected}.")
 
 
+class NumbersError(ErIlError, ValueError):
+    """Values that are no numbers, not finite, or beyond what they can mean; says which, and what is expected."""
+
+
+class NotResetError(ErIlError, ValueError):
+    """An environment that was told to step before its first reset."""
+
+    def __init__(self) -> None:
+        super().__init__("There is no episode to step in: call reset first.")
+
+
 class BoundsError(ErIlError, ValueError):
     """A change larger than the bounds that a delta space declares."""
 

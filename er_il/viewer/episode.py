@@ -7,6 +7,7 @@ import numpy as np
 from er_il.arms.portable import arm_spec
 from er_il.datasets.dataset import Dataset
 from er_il.datasets.decoding import decode_episode, read_encoded_episodes
+from er_il.datasets.number_checks import check_numbers
 from er_il.datasets.schema import DEMO_SEED, ENVIRONMENT_STATE, STATE
 from er_il.evaluation.trace import Array, Trace
 from er_il.spaces.action_space import ActionSpace
@@ -29,7 +30,7 @@ def trace_of_episode(root: Path, number: int, arm: str = "") -> Trace:
         arm: Label of the arm, where there are several.
 
     Raises:
-        DatasetError: the folder is no such dataset, or has no such episode.
+        DatasetError: the folder is no such dataset, or has no such episode, or its numbers cannot be.
         UnknownNameError: it has no such arm.
     """
     dataset = Dataset(root)
@@ -39,6 +40,7 @@ def trace_of_episode(root: Path, number: int, arm: str = "") -> Trace:
         raise DatasetError(
             f"{root} has no episode {number}. Valid: {min(dataset.episodes)} to {max(dataset.episodes)}."
         )
+    check_numbers(dataset, layout, (ENVIRONMENT_STATE,), episode=number)
     rows = dataset.episodes[number]
     episodes = read_encoded_episodes(dataset, layout, dataset.joints_column(layout))
     episode = next(each for each in episodes if each.number == number)

@@ -11,23 +11,24 @@ import numpy as np
 
 from er_il.arms.arm import Arm, Vector
 from er_il.kinematics.solver import kinematics_of
-from er_il.support.errors import UnknownNameError
+from er_il.support.episode_end import Step, after_the_end
+from er_il.support.errors import NotResetError, UnknownNameError
 from er_il.support.shapes import Shape
 from sim_tasks.tasks.observation import Observer, object_pose
+from sim_tasks.tasks.placement import Area, Placement, read_options
 from sim_tasks.tasks.registration import Demonstrator, leader_class, registration
 from sim_tasks.tasks.rewards import Reward, total
+from sim_tasks.tasks.targets import JointTargets
 from sim_tasks.world.camera import PICTURE, Cameras
 from sim_tasks.world.contact import contact_force
 from sim_tasks.world.geometry import world_shapes
 from sim_tasks.world.randomisation import span
 from sim_tasks.world.robot import FINGER_BODIES, RobotModel, shoulder_offset
-from sim_tasks.world.scene import scene_spec
+from sim_tasks.world.scene import BENCH_CENTRE, BENCH_SIZE, scene_spec
 
 RATE = 20  # [Hz] of control
 COLLISION_FORCE = 20.0  # [N] at which a Panda's collision reflex stops it, by its makers' default
 SUCCESS_STEPS = 5  # consecutive control steps (0.25 s) for which success must hold
-
-Placement = dict[str, tuple[float, float, float]]  # object: x, y [m], yaw [rad]
 
 
 class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
@@ -39,7 +40,8 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
     of each object; ``pixels``: a (size, size, 3) uint8 image a camera, if cameras are asked for.
     Reward: the sum, in [0, 1], of the terms in ``info["reward_terms"]``; 1 if the goal holds.
     Every ``info`` has ``is_success`` and ``failure`` (empty while there is none) besides. Success and failure
-    terminate an episode; at the step limit it is truncated, and ``failure`` names the reason.
+    terminate an episode; at the step limit it is truncated, and ``failure`` names the reason. From then on the world
+    goes on, as a real one does, but the verdict stands, and there is no reward, until the next reset.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": RATE}  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -49,6 +51,7 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
     objects: ClassVar[tuple[str, ...]]  # bodies that move, in the order of environment_state
     obstacles: ClassVar[tuple[str, ...]]  # bodies that the robot must not run into
     arms: ClassVar[tuple[str, ...]] = ("panda",)  # presets that can do the task
+    area: ClassVar[Area] = Area.around(BENCH_CENTRE, BENCH_SIZE)  # on which objects may be placed by hand
     start: ClassVar[tuple[float, ...]]  # (7,) [rad] of the last seven joints; the joints below them start at home
     reward: ClassVar[Reward]
 
@@ -99,8 +102,10 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
         self._cameras = Cameras(self.model, cameras, image_size, (visualization_height, visualization_width))
         self._observer = Observer(self.arm, self.robot, self.objects, self._cameras)
         self._steps = self._success_steps = 0
-        lower, upper = np.append(self.arm.lower, 0.0), np.append(self.arm.upper, 1.0)
-        self.action_space = gym.spaces.Box(lower.astype(np.float32), upper.astype(np.float32))
+        self._targets = JointTargets(self.arm)
+        self.action_space = self._targets.space
+        self._last: Step | None = None  # the episode's last step, its end once it has ended; None before any reset
+        self._beyond_success = False
         self.observation_space = self._observer.space()
         self._leader_settings = leader_settings
         if leader_settings:
@@ -185,28 +190,50 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
     def reset(
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Start an episode. ``options={"state": {name: (x, y, yaw)}}`` places objects by hand."""
+        """Start an episode.
+
+        Args:
+            seed: Seed of the initial state.
+            options: ``state``, a pose (x, y, yaw) by object, places these by hand, anywhere in the task's ``area``;
+                ``beyond_success=True`` lets success be no end: the episode is judged on, to record all of it.
+
+        Raises:
+            ValueError: an option or object is unknown, or a pose is none; the world stays as it is.
+        """
+        chosen, self._beyond_success = read_options(options, self.objects, self.area)
         super().reset(seed=seed)
         start = self.nominal_start
         start[-len(self.start) :] += self.np_random.uniform(-self._start_range, self._start_range, len(self.start))
-        placement = self._draw(self.np_random)
-        chosen = (options or {}).get("state", {})
-        for name, pose in chosen.items():
-            if name not in placement:
-                raise UnknownNameError("object", name, placement)
-            x, y, yaw = pose
-            placement[name] = (float(x), float(y), float(yaw))
+        placement = self._draw(self.np_random) | chosen
         mujoco.mj_resetData(self.model, self.data)
         self.robot.place(self.data, start, 1.0)
         self._place(placement)
         mujoco.mj_forward(self.model, self.data)
         self._steps = self._success_steps = 0
         terms = self.reward.terms(self._progress(), success=False)
-        return self._observer.reset(self.data), {"is_success": False, "failure": "", "reward_terms": terms}
+        observation, info = self._observer.reset(self.data), {"is_success": False, "failure": "", "reward_terms": terms}
+        self._last = observation, 0.0, False, False, info
+        return observation, info
 
-    def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        """Servo towards joint targets for one control period."""
-        command = np.clip(np.asarray(action, dtype=np.float64), self.action_space.low, self.action_space.high)
+    def step(self, action: np.ndarray) -> Step:
+        """Servo towards joint targets for one control period; beyond the Box, up to 2 pi, they are clipped.
+
+        Raises:
+            ValueError: what came is no action (not finite, of another shape or type, farther beyond the Box), or no
+                episode was started. The world stays as it is.
+        """
+        command = self._targets.checked(action)
+        if self._last is None:
+            raise NotResetError
+        _, _, terminated, truncated, info = self._last
+        step = self._advance(command)
+        if truncated or (terminated and not (info["is_success"] and self._beyond_success)):
+            return after_the_end(self._last, step[0])
+        self._last = step
+        return step
+
+    def _advance(self, command: Vector) -> Step:
+        """Move the world on by one control period, and judge it."""
         self.robot.command(self.data, command[:-1], command[-1])
         mujoco.mj_step(self.model, self.data, nstep=self._substeps)
         mujoco.mj_forward(self.model, self.data)  # poses and contacts at the new positions

@@ -14,6 +14,7 @@ import numpy as np
 
 from er_il.arms.arm import Vector
 from sim_tasks.tasks.cup_task import CUP, CupTask
+from sim_tasks.tasks.placement import Area
 from sim_tasks.world.props import Cabinet, Wall
 
 OUTSIDE = 0.02  # [m] between the cabinet's front and the whole of a cup that is out
@@ -28,6 +29,7 @@ class CabinetCup(CupTask):
     arms = ("panda", "panda8")
     surface = cabinet.floor
     centre = (0.72, 0.0)
+    area = Area((cabinet.front, cabinet.front + cabinet.depth), (-cabinet.inner_width / 2, cabinet.inner_width / 2))
 
     def __init__(self, **kwargs: Any) -> None:
         """Build the task; for the arguments see :class:`CupTask`."""

@@ -5,8 +5,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from sim_tasks.tasks.arm_task import Placement
 from sim_tasks.tasks.pick_task import FREED, PickTask
+from sim_tasks.tasks.placement import Placement
 from sim_tasks.world.grip import firm_grip
 from sim_tasks.world.props import Goblet
 from sim_tasks.world.randomisation import sides

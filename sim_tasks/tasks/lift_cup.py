@@ -3,6 +3,7 @@
 import mujoco
 
 from sim_tasks.tasks.cup_task import CupTask
+from sim_tasks.tasks.placement import Area
 from sim_tasks.world.props import Stand
 
 
@@ -16,6 +17,7 @@ class LiftCup(CupTask):
     arms = ("panda", "panda8")
     surface = stand.height
     centre = stand.centre
+    area = Area.around(stand.centre, stand.size)
     start = (0.0, -0.83, 0.0, -1.95, 0.0, 2.34, 0.785)  # above and in front of the stand, the elbow up
 
     def _build(self, spec: mujoco.MjSpec) -> None:

@@ -6,7 +6,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from er_il.arms.arm import Vector
-from sim_tasks.tasks.arm_task import ArmTask, Placement
+from sim_tasks.tasks.arm_task import ArmTask
+from sim_tasks.tasks.placement import Placement
 from sim_tasks.tasks.rewards import Reward, proximity
 from sim_tasks.world.contact import collision_geoms, distance, touching
 

@@ -10,7 +10,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from sim_tasks.tasks.arm_task import ArmTask, Placement
+from sim_tasks.tasks.arm_task import ArmTask
+from sim_tasks.tasks.placement import Placement
 from sim_tasks.tasks.rewards import Reward, proximity
 from sim_tasks.world.contact import collision_geoms, distance, touching
 from sim_tasks.world.props import PushButton

@@ -12,8 +12,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from sim_tasks.tasks.arm_task import Placement
 from sim_tasks.tasks.pick_task import FREED, PickTask
+from sim_tasks.tasks.placement import Area, Placement
 from sim_tasks.world.household import BEAR, BOOKS, CACTUS, HEAD_HEIGHT, LAMP, VASE, Sideboard, Thing
 from sim_tasks.world.props import Wall
 from sim_tasks.world.randomisation import sides, span
@@ -39,6 +39,7 @@ class RetrieveBear(PickTask):
     clutter = objects[1:]
     obstacles = ("sideboard", "wall")
     sideboard = Sideboard()
+    area = Area((sideboard.front, sideboard.front + sideboard.depth), (-sideboard.width / 2, sideboard.width / 2))
     target = "bear"
     grasp_height = HEAD_HEIGHT
     lift_height = 0.10  # from which the bear is out of the clutter

@@ -7,6 +7,8 @@ from sim_tasks.world.camera import VIEWS
 from sim_tasks.world.props import BOX
 from sim_tasks.world.robot import robot_spec, shoulder_offset
 
+BENCH_CENTRE, BENCH_SIZE = (0.4, 0.0), (1.3, 1.1)  # [m] x, y; its sides
+
 # name: colour, specular, shininess, reflectance
 MATERIALS = {
     "wood": ((0.72, 0.53, 0.36, 1.0), 0.15, 0.2, 0.0),
@@ -47,7 +49,9 @@ def scene_spec(arm: Arm) -> mujoco.MjSpec:
         conaffinity=0,
     )
     # The bench stands 1 mm below the robot's base, so that their touching is no collision.
-    world.add_geom(name="bench", type=BOX, size=(0.65, 0.55, 0.02), pos=(0.4, 0, -0.021), material="bench")
+    (x, y), (length, width) = BENCH_CENTRE, BENCH_SIZE
+    bench = (length / 2, width / 2, 0.02)
+    world.add_geom(name="bench", type=BOX, size=bench, pos=(x, y, -0.021), material="bench")
     for x in (-0.2, 1.0):
         for y in (-0.5, 0.5):
             world.add_geom(
