@@ -3,7 +3,6 @@
 import json
 import shutil
 import sys
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -54,6 +53,7 @@ def held(lengths: tuple[int, ...] = LENGTHS) -> tuple[Held, Layout]:
     dataset = Held(Path("held"), {ACTION: commanded, STATE: commanded - np.float32(0.01), EPISODE: numbers})
     feature = {"dtype": "float32", "shape": (8,), "names": list(NAMES)}
     dataset.__dict__["info"] = {"features": {ACTION: feature, STATE: dict(feature)}, "total_frames": len(t)}
+    dataset.__dict__["info"]["total_episodes"] = len(lengths)
     return dataset, wire([Wiring(arm="panda")], dataset.features, "erj", "quat")
 
 
@@ -144,17 +144,6 @@ def test_a_message_lists_some_episodes_and_counts_the_rest() -> None:
     message = str(caught.value)
     assert "30 of 30 episodes are not sound: episode 0: action panda_joint" in message
     assert "; and 20 more episodes." in message and "--units deg" in message and "\n" not in message
-
-
-def test_a_million_frames_would_be_checked_in_two_seconds() -> None:
-    dataset, layout = held((2000,) * 125)
-    dataset.columns[STATE][-1, -1] = np.nan
-    seconds = []
-    for _ in range(2):
-        before = time.process_time()
-        assert number_problems(dataset, layout) == {124: ["observation.state lift is nan in frame 1999"]}
-        seconds.append(time.process_time() - before)
-    assert min(seconds) < 0.5
 
 
 def test_every_command_refuses_the_same(reach_cup: Path, tmp_path: Path, monkeypatch, capsys) -> None:

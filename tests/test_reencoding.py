@@ -348,11 +348,16 @@ def test_a_failure_leaves_nothing_behind(places, tmp_path, monkeypatch):
 
 
 def test_repository_ids_are_looked_up_by_lerobot(places, tmp_path, monkeypatch):
-    """LeRobot finds datasets under HF_LEROBOT_HOME; here every file is a link, as in the hub's cache."""
-    for path in (each for each in (places / "source").rglob("*") if each.is_file()):
-        link = tmp_path / "lab/bimanual" / path.relative_to(places / "source")
+    """LeRobot finds datasets under HF_LEROBOT_HOME; here one that is a snapshot in the hub's cache, all links."""
+    cached = tmp_path / "datasets--lab--bimanual"
+    (cached / "blobs").mkdir(parents=True)
+    for number, path in enumerate(each for each in (places / "source").rglob("*") if each.is_file()):
+        link = cached / "snapshots/main" / path.relative_to(places / "source")
         link.parent.mkdir(parents=True, exist_ok=True)
-        link.symlink_to(path)
+        shutil.copy(path, cached / "blobs" / str(number))
+        link.symlink_to(cached / "blobs" / str(number))
+    (tmp_path / "lab").mkdir()
+    (tmp_path / "lab/bimanual").symlink_to(cached / "snapshots/main")
     monkeypatch.setattr(dataset_metadata, "HF_LEROBOT_HOME", tmp_path)
     assert find_dataset("lab/bimanual") == tmp_path / "lab/bimanual"
     arms = ("--arms", places / "arms.yaml")

@@ -16,7 +16,8 @@ from er_il.envs.wrapper import make_action_space_env
 from er_il.evaluation.replay import replay, replay_demo, write_report
 from er_il.support.errors import DatasetError
 
-_UNSPECIFIED = {"codebase_version": "v3.0", "fps": 20, "total_frames": 1, "features": {"action": {"shape": [1]}}}
+_UNSPECIFIED = {"codebase_version": "v3.0", "fps": 20, "total_frames": 1, "total_episodes": 1}
+_UNSPECIFIED |= {"features": {"action": {"dtype": "float32", "shape": [1]}}}
 RECIPE = Recipe.load("reach_cup").replaced(disturbance=0.0).resized(2)
 
 
