@@ -26,6 +26,8 @@ TABLES = {
     "drifts": "deltas",
     "round_trips": "round_trips",
     "training_times": "training_time",
+    "environment_steps": "throughput",
+    "kills": "faults",
     "cells": "success",
 }
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import torch
 from huggingface_hub.constants import SAFETENSORS_SINGLE_FILE
-from lerobot.configs import PreTrainedConfig
+from lerobot.configs import FeatureType, PreTrainedConfig
 from lerobot.envs import preprocess_observation
 from lerobot.policies import PreTrainedPolicy, make_policy, make_pre_post_processors
 from lerobot.utils.constants import OBS_IMAGES
@@ -115,7 +115,10 @@ class Actor:
             preprocess, postprocess = make_pre_post_processors(
                 policy_config, pretrained_path=str(path), preprocessor_overrides=overrides
             )
-        return cls(policy, preprocess, postprocess)
+            actor = cls(policy, preprocess, postprocess)
+            # What is wrong in a processor's settings shows at its first use.
+            actor.act(_blank(config), config.task or "")
+        return actor
 
     def reset(self, seed: int) -> None:
         """Begin episodes. Some policies, such as Diffusion, draw random numbers: from ``seed`` on, the same ones."""
@@ -129,6 +132,18 @@ class Actor:
         with torch.inference_mode():
             action = self.postprocess(self.policy.select_action(self.preprocess(batch)))
         return action.cpu().numpy()
+
+
+def _blank(config: ErIlEnvConfig) -> dict[str, Any]:
+    """An observation of one environment in which everything is zero."""
+    observation: dict[str, Any] = {}
+    for key, feature in config.features.items():
+        if feature.type is FeatureType.VISUAL:
+            pixels = observation.setdefault("pixels", {})
+            pixels[key.removeprefix("pixels/")] = np.zeros((1, *feature.shape), dtype=np.uint8)
+        elif feature.type is not FeatureType.ACTION:
+            observation[key] = np.zeros((1, *feature.shape), dtype=np.float32)
+    return observation
 
 
 def _filled(rows: torch.Tensor) -> torch.Tensor:
