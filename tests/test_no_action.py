@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import gymnasium
-import mujoco
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -38,6 +37,8 @@ def encoded() -> Iterator[ActionSpaceEnv]:
 
 def state(world: ArmTask) -> np.ndarray:
     """All that decides what the world does next."""
+    import mujoco  # after sim_tasks, which chooses how it renders
+
     mj: Any = mujoco
     spec = mj.mjtState.mjSTATE_INTEGRATION
     found = np.empty(mj.mj_stateSize(world.model, spec))
