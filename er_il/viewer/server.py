@@ -1,10 +1,7 @@
 """Rerun's server of an episode for browsers: on this machine alone, unless another address is asked for."""
 
-import os
-import signal
 import socket
 import subprocess
-import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -13,9 +10,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from urllib.parse import quote
 
+import rerun_cli
+
 from er_il.evaluation.trace import Trace
 from er_il.support.errors import ErIlError
 from er_il.support.shapes import Shape
+from er_il.support.workers import end_with_parent
 from er_il.viewer.show import save_recording
 
 GRPC_PORT, WEB_PORT = 9876, 9090  # Rerun's own
@@ -40,18 +40,17 @@ def served(trace: Trace, shapes: Sequence[Shape], address: str) -> Iterator[str]
         save_recording(trace, shapes, file)
         ports = _free(GRPC_PORT, address), _free(WEB_PORT, address)
         # The SDK's servers listen on every address of the machine; only Rerun's program can be told otherwise.
-        command = [sys.executable, "-m", "rerun_cli", str(file), "--serve-web", "--bind", address]
+        command = [str(Path(rerun_cli.__file__).with_name("rerun")), str(file), "--serve-web", "--bind", address]
         command += ["--port", str(ports[0]), "--web-viewer-port", str(ports[1])]
         with (
             log.open("wb") as output,
-            # A session of its own: the module starts the program as another process, which must end, too.
-            subprocess.Popen(command, stdout=output, stderr=output, start_new_session=True) as server,
+            subprocess.Popen(command, stdout=output, stderr=output, preexec_fn=end_with_parent) as server,
         ):
             try:
                 _wait(server, address, ports, log)
                 yield f"http://{_written(host)}:{ports[1]}?url={quote(f'rerun+http://{_written(host)}:{ports[0]}/proxy')}"
             finally:
-                os.killpg(server.pid, signal.SIGTERM)
+                server.terminate()
 
 
 def _wait(server: "subprocess.Popen[bytes]", address: str, ports: Sequence[int], log: Path) -> None:
