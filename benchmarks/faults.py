@@ -5,9 +5,10 @@
 Commands are killed at moments spread over their time and run again; inputs are damaged by drawn mutations; commanders
 and environments are given actions that no policy should predict. The report counts what was not as it is promised: a
 run that was resumed gives what an undisturbed one gives, damage is told in a line, no command leaves the arm's limits.
-An hour on two cores.
+More than an hour on two cores; the same command goes on where it was interrupted.
 """
 
+import json
 import os
 import shutil
 from collections.abc import Callable
@@ -114,17 +115,33 @@ def main(
         for part in range(parts):
             jobs.append(("commands", fuzz_commanders, (-(-actions // parts), seed + part)))
             jobs.append(("environments", fuzz_environments, (-(-steps // parts), seed + part)))
-        rows: dict[str, list[Any]] = {kind: [] for kind, *_ in jobs}
+        # A job's row is kept as soon as it is there: the same command goes on where it was interrupted.
+        code = provenance()["git"]
+        kept = {index: out / "jobs" / f"{index}.json" for index in range(len(jobs))}
+        asked = {
+            index: [code, kind, *(each for each in arguments if isinstance(each, int))]
+            for index, (kind, _, arguments) in enumerate(jobs)
+        }
+        found = {index: json.loads(path.read_text()) for index, path in kept.items() if path.exists()}
+        done = {index: each["row"] for index, each in found.items() if each["of"] == asked[index]}
         with Progress() as progress, ProcessPoolExecutor(parts, mp_context=preloaded()) as executor:
-            bar = progress.add_task("Faults", total=len(jobs))
-            running: dict[Future[Any], str] = {
-                executor.submit(function, *arguments): kind for kind, function, arguments in jobs
+            bar = progress.add_task("Faults", total=len(jobs), completed=len(done))
+            running: dict[Future[Any], int] = {
+                executor.submit(function, *arguments): index
+                for index, (_, function, arguments) in enumerate(jobs)
+                if index not in done
             }
             for future in as_completed(running):
-                rows[running[future]].append(future.result())
+                index = running[future]
+                done[index] = future.result()
+                write_json(kept[index], {"of": asked[index], "row": done[index]})
                 progress.advance(bar)
+    rows: dict[str, list[Any]] = {kind: [] for kind, *_ in jobs}
+    for index, (kind, *_) in enumerate(jobs):
+        rows[kind].append(done[index])
     meta = provenance() | {"seed": seed, "task": TASK}
     write_json(out / "report.json", {"meta": meta, **rows})
+    shutil.rmtree(out / "jobs")
     for row in (*rows["kills"], *rows["inputs"]):
         for fault in row["faults"]:
             print(row["command"], fault)
