@@ -18,11 +18,12 @@ from safetensors.numpy import save_file
 from er_il import Arm
 from er_il.cli import USER_MISTAKE, main
 from er_il.datasets.dataset import EPISODE, Dataset
+from er_il.datasets.integrity import STATS
 from er_il.datasets.joint_paths import read_joint_paths
 from er_il.datasets.number_checks import DEGREES, check_numbers, number_problems
 from er_il.datasets.schema import ENVIRONMENT_STATE, LEADER_JOINTS, STATE
 from er_il.datasets.wiring import Wiring, wire
-from er_il.policy.training_data import STATS, check_training_data
+from er_il.policy.training_data import check_training_data
 from er_il.robots.attachment import attach
 from er_il.spaces.layout import Layout
 from er_il.spaces.spec import ACTION

@@ -33,6 +33,7 @@ COMMANDS: dict[str, str] = {
 
 USER_MISTAKE = 2  # exit code, as for unknown options
 INTERRUPTED = 130
+RESUMES = "Interrupted. The same command resumes."
 
 
 def main() -> None:
@@ -50,10 +51,10 @@ def main() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
     except KeyboardInterrupt:
-        _leave("Interrupted. The same command resumes.", INTERRUPTED)
+        _leave(RESUMES, INTERRUPTED)
     except Exception as error:
         if interruption.came:  # a library that was being imported, or called back, has made something else of it
-            _leave("Interrupted. The same command resumes.", INTERRUPTED)
+            _leave(RESUMES, INTERRUPTED)
         if said := explanation(error):
             _leave(f"error: {said}", USER_MISTAKE)
         error.add_note(REPORT)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
+from numpy.typing import NDArray
 
 from er_il.datasets.dataset import EPISODE, EPISODES, INFO, Dataset
 from er_il.datasets.schema import STATE
@@ -16,6 +17,7 @@ from er_il.support.errors import DatasetError
 from er_il.support.json_files import read_json
 
 TASKS, STATS = Path("meta/tasks.parquet"), Path("meta/stats.json")
+STATISTICS = ("mean", "std", "min", "max")  # by which policies normalise
 TASK = "task_index"
 _FROM, _TO = "dataset_from_index", "dataset_to_index"
 _NEEDED = (EPISODE, _FROM, _TO, "length", "data/chunk_index", "data/file_index")
@@ -85,7 +87,7 @@ def _check_stats(dataset: Dataset) -> None:
     for name in (each for each in (ACTION, STATE) if each in dataset.features):
         width = len(dataset.names(name))
         of_column = stats.get(name)
-        for statistic in ("mean", "std", "min", "max"):
+        for statistic in STATISTICS:
             values = of_column.get(statistic) if isinstance(of_column, dict) else None
             if not _numbers(values, width):
                 raise DatasetError(f"{path} is damaged: the {statistic} of {name} is not a list of {width} numbers.")
@@ -95,11 +97,16 @@ def _check_stats(dataset: Dataset) -> None:
 
 
 def _numbers(values: Any, width: int | None = None) -> bool:
+    array = number_list(values)
+    return array is not None and bool(np.isfinite(array).all()) and width in (None, len(array.ravel()))
+
+
+def number_list(values: Any) -> NDArray[np.float64] | None:
+    """A list of numbers, or of such lists, in a JSON file as an array; None if it is anything else."""
     try:
-        array = np.asarray(values, dtype=np.float64)
+        return np.asarray(values, dtype=np.float64) if isinstance(values, list) else None
     except (TypeError, ValueError):
-        return False
-    return isinstance(values, list) and bool(np.isfinite(array).all()) and width in (None, len(array.ravel()))
+        return None
 
 
 def _videos(dataset: Dataset, name: str, episodes: pa.Table) -> Iterator[tuple[Path, float]]:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from er_il.datasets.dataset import DATA, EPISODE, EPISODES, Dataset, Floats
 from er_il.datasets.schema import Feature
 from er_il.datasets.tables import episode_slices, parquet_files, read_table
-from er_il.support.links import check_links
+from er_il.support.links import TOOLS, check_links
 
 Stats = dict[str, dict[str, NDArray[Any]]]
 Advance = Callable[[int], object]  # called with the number of frames done since the last call
@@ -138,7 +138,7 @@ def _with_column(table: pa.Table, field: pa.Field | str, values: pa.Array | pa.C
 
 def _copy(source: Path, target: Path) -> None:
     """Copy all that does not depend on the columns; link the videos."""
-    shutil.copytree(source, target, ignore=_except(source, {DATA, _VIDEOS, ".cache", ".git", EPISODES}))
+    shutil.copytree(source, target, ignore=_except(source, {DATA, _VIDEOS, EPISODES, *TOOLS}))
     if (source / _VIDEOS).exists():
         shutil.copytree(source / _VIDEOS, target / _VIDEOS, copy_function=_link)
 

@@ -17,7 +17,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, Field, StrictInt, StrictStr
 
-from er_il.envs.trust import check_steps
+from er_il.envs.trust import POSTPROCESSOR, check_steps, read_processor
 from er_il.kinematics.rotation import Quaternion
 from er_il.spaces.base import ArmSpace
 from er_il.spaces.spec import action_spec
@@ -147,12 +147,6 @@ class _PolicyConfig(BaseModel):
     tags: list[StrictStr] | None = None
 
 
-class _Processor(BaseModel):
-    """What er_il needs of a policy's pre- and post-processor."""
-
-    steps: list[dict[StrictStr, Any]]
-
-
 def read_policy_config(policy: Path) -> dict[str, Any]:
     """Read the ``config.json`` of a policy in a folder.
 
@@ -165,20 +159,9 @@ def read_policy_config(policy: Path) -> dict[str, Any]:
     return config
 
 
-def read_processor(path: Path) -> dict[str, Any]:
-    """Read a policy's pre- or post-processor.
-
-    Raises:
-        PolicyError: it is missing or damaged.
-    """
-    processor = read_json(path, PolicyError)
-    check_values(_Processor, processor, path, PolicyError)
-    return processor
-
-
 def decodes(policy: str | Path) -> bool:
     """True if a policy in a folder decodes its actions by itself (see :mod:`er_il.robots.attachment`)."""
-    path = Path(policy) / "policy_postprocessor.json"
+    path = Path(policy) / POSTPROCESSOR
     if not path.is_file():
         return False  # LeRobot says what is missing
     return any(step.get("registry_name") == DECODE_POLICY_ACTION for step in read_processor(path)["steps"])

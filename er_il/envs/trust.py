@@ -4,12 +4,33 @@ LeRobot 0.6.1 imports and calls whatever a processor file names as the ``class``
 (``DataProcessorPipeline._resolve_step_class``). Steps by their registered names come from installed packages alone.
 """
 
-import json
 from pathlib import Path
+from typing import Any
 
+from pydantic import BaseModel, StrictStr
+
+from er_il.support.declaration import check_values
 from er_il.support.errors import PolicyError
+from er_il.support.json_files import read_json
 
-PROCESSORS = ("policy_preprocessor.json", "policy_postprocessor.json")
+PROCESSORS = PREPROCESSOR, POSTPROCESSOR = "policy_preprocessor.json", "policy_postprocessor.json"
+
+
+class _Processor(BaseModel):
+    """What er_il needs of a policy's pre- and post-processor."""
+
+    steps: list[dict[StrictStr, Any]]
+
+
+def read_processor(path: Path) -> dict[str, Any]:
+    """Read a policy's pre- or post-processor.
+
+    Raises:
+        PolicyError: it is missing or damaged.
+    """
+    processor = read_json(path, PolicyError)
+    check_values(_Processor, processor, path, PolicyError)
+    return processor
 
 
 def check_steps(policy: str | Path) -> None:
@@ -25,14 +46,8 @@ def check_steps(policy: str | Path) -> None:
         file = _file(policy, name)
         if file is None:
             continue  # LeRobot loads none, or says what it misses
-        try:
-            steps: list[dict[str, object]] = json.loads(file.read_text())["steps"]
-            if not isinstance(steps, list):
-                raise TypeError("its steps are no list")
-            named = [(step.get("registry_name"), step.get("class")) for step in steps]
-        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-            raise PolicyError(f"{file} describes no processor: {error}.") from error
-        for registered, imported in named:
+        for step in read_processor(file)["steps"]:
+            registered, imported = step.get("registry_name"), step.get("class")
             if imported is not None or not isinstance(registered, str):
                 raise PolicyError(
                     f"{file} asks LeRobot to import and call {imported!r}, which may be any program. "

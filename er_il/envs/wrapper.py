@@ -81,8 +81,9 @@ class ActionSpaceEnv(
             ValueError: what came is no vector of the space's dimensions, or no episode was started.
         """
         ahead, self.ahead = self.ahead, None
-        self.query(action)
-        if self._last is not None:
+        if self._last is not None or not self._started:
+            self.query(action)  # refuses what is no action, and a step before the first reset
+            assert self._last is not None
             return after_the_end(self._last, self._last[0])
         commanded = self._commander.command(action, self._measured(), ahead and (ahead,))
         (arm,) = commanded.arms

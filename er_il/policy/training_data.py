@@ -1,19 +1,16 @@
 """Checks of what a training reads: the numbers of its columns, and the statistics that normalise them."""
 
 from collections.abc import Iterable
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from er_il.datasets.dataset import Dataset, read_metadata
+from er_il.datasets.integrity import STATISTICS, STATS, number_list
 from er_il.datasets.number_checks import check_numbers
 from er_il.spaces.spec import ACTION
 from er_il.support.errors import DatasetError
 
-STATS = Path("meta/stats.json")
 OBSERVATION = "observation."
-NEEDED = ("mean", "std", "min", "max")  # by which policies normalise
 
 
 def check_training_data(dataset: Dataset, inputs: Iterable[str]) -> None:
@@ -43,13 +40,13 @@ def _damage(dataset: Dataset, column: str, stats: object) -> list[str]:
     own = stats.get(column) if isinstance(stats, dict) else None
     if not isinstance(own, dict):
         return [f"{column} has none"]
-    if missing := [name for name in NEEDED if name not in own]:
+    if missing := [name for name in STATISTICS if name not in own]:
         return [f"{column} has no {', '.join(missing)}"]
     values = dataset.vectors(column)
     varies = np.ptp(values, axis=0) > 0
     found, read = [], {}
-    for name in NEEDED:
-        numbers = _numbers(own[name])
+    for name in STATISTICS:
+        numbers = number_list(own[name])
         if numbers is None or numbers.shape != varies.shape:
             found.append(f"{column} {name} is no list of {len(varies)} numbers")
         elif bad := _names(dataset, column, ~np.isfinite(numbers)):
@@ -61,13 +58,6 @@ def _damage(dataset: Dataset, column: str, stats: object) -> list[str]:
     if "min" in read and "max" in read and (bad := _names(dataset, column, (read["min"] >= read["max"]) & varies)):
         found.append(f"{column} min is not below max for {bad}, which varies")
     return found
-
-
-def _numbers(given: Any) -> np.ndarray | None:
-    try:
-        return np.asarray(given, dtype=np.float64)
-    except (TypeError, ValueError):
-        return None
 
 
 def _names(dataset: Dataset, column: str, chosen: np.ndarray) -> str:

@@ -6,16 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from lerobot.policies.factory import POLICY_POSTPROCESSOR_DEFAULT_NAME, POLICY_PREPROCESSOR_DEFAULT_NAME
 from lerobot.processor import RelativeActionsProcessorStep
 
-from er_il.envs.contract import DECODE_POLICY_ACTION, read_processor
+from er_il.envs.contract import DECODE_POLICY_ACTION
+from er_il.envs.trust import POSTPROCESSOR, PREPROCESSOR, read_processor
 from er_il.robots.processors import DecodePolicyAction
 from er_il.support.atomic_files import atomic_folder
 
-_PREPROCESSOR, _POSTPROCESSOR = (
-    f"{name}.json" for name in (POLICY_PREPROCESSOR_DEFAULT_NAME, POLICY_POSTPROCESSOR_DEFAULT_NAME)
-)
 _KEEP_STATE, _RENAME = "relative_actions_processor", "rename_observations_processor"
 
 
@@ -35,8 +32,8 @@ def write_copy(
     step = DecodePolicyAction(spec=spec, period=period, on_invalid=on_invalid, state_names=list(state_names))
     with atomic_folder(out) as partial:
         shutil.copytree(source, partial)
-        _edit(partial / _PREPROCESSOR, _with_state_kept)
-        _edit(partial / _POSTPROCESSOR, lambda steps: [*steps, _entry(DECODE_POLICY_ACTION, step.get_config())])
+        _edit(partial / PREPROCESSOR, _with_state_kept)
+        _edit(partial / POSTPROCESSOR, lambda steps: [*steps, _entry(DECODE_POLICY_ACTION, step.get_config())])
     return step
 
 

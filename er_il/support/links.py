@@ -5,7 +5,7 @@ from pathlib import Path
 
 from er_il.support.errors import ErIlError
 
-_OWN = {".git", ".cache"}  # folders of tools, which nothing here copies
+TOOLS = {".git", ".cache"}  # folders of tools, which nothing here copies
 
 
 def check_links(root: Path) -> None:
@@ -20,7 +20,7 @@ def check_links(root: Path) -> None:
     if inside[0].parent.name == "snapshots":
         inside.append(inside[0].parents[1] / "blobs")
     for folder, folders, files in os.walk(root):
-        folders[:] = [name for name in folders if name not in _OWN]
+        folders[:] = [name for name in folders if name not in TOOLS]
         for name in (*folders, *files):
             path = Path(folder) / name
             if path.is_symlink() and not any(path.resolve().is_relative_to(each) for each in inside):
