@@ -73,7 +73,7 @@ def fuzz_commanders(actions: int, seed: int) -> dict[str, Any]:
             faults["too_fast"] += bool(np.any(np.abs(command.q - last) > arm.velocity * PERIOD + TOLERANCE))
             last = command.q
         done += count
-    return {"actions": done, "seed": seed, **faults, "statuses": dict(sorted(statuses.items()))}
+    return {"actions": done, **faults, "statuses": dict(sorted(statuses.items()))}
 
 
 def fuzz_environments(actions: int, seed: int) -> dict[str, Any]:
@@ -111,4 +111,4 @@ def fuzz_environments(actions: int, seed: int) -> dict[str, Any]:
             faults["outside_limits"] += bool(np.any((q < arm.lower - 0.05) | (q > arm.upper + 0.05)))
         env.close()
         done += count
-    return {"actions": done, "seed": seed, **faults}
+    return {"actions": done, **faults}

@@ -11,7 +11,8 @@ More than an hour on two cores; the same command goes on where it was interrupte
 import json
 import os
 import shutil
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -20,7 +21,7 @@ from typing import Any
 import tyro
 import yaml
 from fault_actions import fuzz_commanders, fuzz_environments
-from fault_inputs import TRIALS, try_damaged
+from fault_inputs import TASK, TRIALS, try_damaged
 from fault_kills import commands, kill_often
 from faulty import preloaded
 from lerobot.datasets import LeRobotDataset
@@ -38,8 +39,6 @@ from er_il.policy.training import Training
 from er_il.support.atomic_files import write_json
 from er_il.support.provenance import provenance
 from er_il.support.workers import ONE_THREAD, cores
-
-TASK = "push_button_elbow"  # its demonstrations are the shortest
 
 
 def prepare(data: Path) -> None:
@@ -81,6 +80,25 @@ def _write_plain(source: Dataset, root: Path) -> None:
     plain.finalize()
 
 
+def _parts(total: int, size: int) -> Iterator[tuple[int, int]]:
+    """Index and size of the parts of a job, of which each is kept by itself."""
+    for part, start in enumerate(range(0, total, size)):
+        yield part, min(size, total - start)
+
+
+def _count(rows: list[dict[str, Any]], part: dict[str, Any]) -> None:
+    """Add a part's counts and faults to the row of its command, if there is one."""
+    row = next((row for row in rows if row.get("command") == part.get("command")), None)
+    if row is None:
+        rows.append(part)
+        return
+    for key, value in part.items():
+        if isinstance(value, dict):
+            row[key] = dict(sorted((Counter(row[key]) + Counter(value)).items()))
+        elif not isinstance(value, str):
+            row[key] += value
+
+
 def main(
     kills: int = 100,
     damages: int = 1000,
@@ -104,17 +122,19 @@ def main(
         folder = Path(name)
         prepare(data := folder / "data")
         jobs: list[tuple[str, Callable[..., Any], tuple[Any, ...]]] = []
-        planned, parts = commands(data), cores()
+        planned = commands(data)
         total = sum(command.share for command in planned)
         for index, command in enumerate(planned):
-            count = max(1, round(kills * command.share / total))
-            jobs.append(("kills", kill_often, (index, count, seed, data, folder / f"kills_{index}")))
+            for part, count in _parts(max(1, round(kills * command.share / total)), 10):
+                place = folder / f"kills_{index}_{part}"
+                jobs.append(("kills", kill_often, (index, count, seed + part, data, place)))
         for index in range(len(TRIALS)):
             count = damages // len(TRIALS) + (index < damages % len(TRIALS))
-            jobs.append(("inputs", try_damaged, (index, max(1, count), seed, data, folder / f"inputs_{index}")))
-        for part in range(parts):
-            jobs.append(("commands", fuzz_commanders, (-(-actions // parts), seed + part)))
-            jobs.append(("environments", fuzz_environments, (-(-steps // parts), seed + part)))
+            for part, some in _parts(max(1, count), 30):
+                place = folder / f"inputs_{index}_{part}"
+                jobs.append(("inputs", try_damaged, (index, some, seed + part, data, place)))
+        jobs += [("commands", fuzz_commanders, (count, seed + part)) for part, count in _parts(actions, 50_000)]
+        jobs += [("environments", fuzz_environments, (count, seed + part)) for part, count in _parts(steps, 10_000)]
         # A job's row is kept as soon as it is there: the same command goes on where it was interrupted.
         code = provenance()["git"]
         kept = {index: out / "jobs" / f"{index}.json" for index in range(len(jobs))}
@@ -124,7 +144,7 @@ def main(
         }
         found = {index: json.loads(path.read_text()) for index, path in kept.items() if path.exists()}
         done = {index: each["row"] for index, each in found.items() if each["of"] == asked[index]}
-        with Progress() as progress, ProcessPoolExecutor(parts, mp_context=preloaded()) as executor:
+        with Progress() as progress, ProcessPoolExecutor(cores(), mp_context=preloaded()) as executor:
             bar = progress.add_task("Faults", total=len(jobs), completed=len(done))
             running: dict[Future[Any], int] = {
                 executor.submit(function, *arguments): index
@@ -138,7 +158,7 @@ def main(
                 progress.advance(bar)
     rows: dict[str, list[Any]] = {kind: [] for kind, *_ in jobs}
     for index, (kind, *_) in enumerate(jobs):
-        rows[kind].append(done[index])
+        _count(rows[kind], done[index])
     meta = provenance() | {"seed": seed, "task": TASK}
     write_json(out / "report.json", {"meta": meta, **rows})
     shutil.rmtree(out / "jobs")
