@@ -5,6 +5,7 @@ Importing the package registers them, and loads neither MuJoCo nor the kinematic
 
 from sim_tasks.registry import TaskEntry, register
 
+RL_STEPS = 400  # control steps of an episode: the paper's 200 decisions at 10 Hz
 _TASKS, _SCRIPTS = "sim_tasks.tasks", "sim_tasks.leader.scripts"
 
 TASKS = (
@@ -20,5 +21,33 @@ TASKS = (
     TaskEntry("retrieve_bear", f"{_TASKS}.retrieve_bear:RetrieveBear", 200, f"{_SCRIPTS}.bear:RetrieveBearLeader"),
 )
 
-for _entry in TASKS:
+# The paper's reinforcement-learning tasks (section V-A), each with a module of the task and one of its leader.
+FULL_BODY = (
+    "reach_elbow_pose",
+    "take_bottle_out_fridge",
+    "slide_cup_obstacles",
+    "serve_coffee_obstacles",
+    "meat_off_grill",
+    "take_cup_out_cabinet",
+)
+STANDARD = (
+    "reach_target",
+    "pick_up_cup",
+    "take_umbrella_out_of_stand",
+    "take_lid_off_saucepan",
+    "pick_and_lift",
+    "stack_wine",
+    "phone_on_base",
+    "put_rubbish_in_bin",
+)
+
+
+def _rl_entry(task: str) -> TaskEntry:
+    name = "".join(word.capitalize() for word in task.split("_"))
+    return TaskEntry(task, f"{_TASKS}.{task}:{name}", RL_STEPS, f"{_SCRIPTS}.{task}:{name}Leader")
+
+
+RL_TASKS = tuple(map(_rl_entry, (*FULL_BODY, *STANDARD)))
+
+for _entry in (*TASKS, *RL_TASKS):
     register(_entry)

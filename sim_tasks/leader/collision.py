@@ -1,7 +1,5 @@
 """Collision checks of the arm's postures."""
 
-from collections.abc import Mapping
-
 import mujoco
 import numpy as np
 
@@ -23,10 +21,10 @@ class Collisions:
         self._obstacles = np.array([self._model.body(name).id for name in obstacles])
         self._robot_bodies = np.array(sorted(self._robot.bodies))
 
-    def place(self, poses: Mapping[str, np.ndarray]) -> None:
-        """Set the poses of free bodies: name -> qpos (7,) of the free joint."""
-        for name, qpos in poses.items():
-            self._data.joint(name).qpos = qpos
+    def copy(self, data: mujoco.MjData) -> None:
+        """Put everything where it is in a state of the same world."""
+        self._data.qpos[:] = data.qpos
+        self._data.mocap_pos[:], self._data.mocap_quat[:] = data.mocap_pos, data.mocap_quat
 
     def is_free(self, q: Vector) -> bool:
         """True if the arm at q (n,) [rad], gripper open, touches neither the obstacles nor itself."""

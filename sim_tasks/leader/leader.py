@@ -8,7 +8,7 @@ import numpy as np
 from er_il.support.errors import PlanError
 from sim_tasks.leader.arm import LeaderArm
 from sim_tasks.leader.motion import Segment
-from sim_tasks.tasks.arm_task import RATE, ArmTask
+from sim_tasks.tasks.arm_task import ArmTask
 from sim_tasks.world.randomisation import SLOWEST, interval, span
 
 DRAWS = 10  # random plans that are tried before the leader gives up
@@ -35,7 +35,7 @@ class Leader[Task: ArmTask](ABC):
         self._via_range = span("via_range", via_range)
         self._speed_range = interval("speed_range", speed_range, least=SLOWEST)
         self._world = world
-        self._arm = LeaderArm(world.arm, 1 / RATE)
+        self._arm = LeaderArm(world.arm, 1 / world.rate)
 
     def demonstrate(self, seed: int) -> Iterator[np.ndarray]:
         """Plan a demonstration of the episode just reset, and play it.

@@ -1,5 +1,6 @@
 """The base of every task: a follower arm in a MuJoCo world, commanded in joint positions."""
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
@@ -26,9 +27,9 @@ from sim_tasks.world.randomisation import span
 from sim_tasks.world.robot import FINGER_BODIES, RobotModel, shoulder_offset
 from sim_tasks.world.scene import BENCH_CENTRE, BENCH_SIZE, scene_spec
 
-RATE = 20  # [Hz] of control
+RATE, RATES = 20, (10, 20)  # [Hz] of control: the usual one, and those that a world can be made for
 COLLISION_FORCE = 20.0  # [N] at which a Panda's collision reflex stops it, by its makers' default
-SUCCESS_STEPS = 5  # consecutive control steps (0.25 s) for which success must hold
+SUCCESS_TIME = 0.25  # [s] for which success must hold
 
 
 class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
@@ -64,6 +65,7 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
         visualization_width: int = PICTURE[1],
         visualization_height: int = PICTURE[0],
         arm: str = "panda",
+        rate: int = RATE,
         start_range: float = 0.02,
         **leader_settings: Any,
     ) -> None:
@@ -76,6 +78,7 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
             visualization_width: Width [px] of the pictures of :meth:`render`.
             visualization_height: Height [px] of these.
             arm: Preset of the follower and the leader, one of the task's ``arms``.
+            rate: Control rate [Hz]; the step limit is an equal time at every rate.
             start_range: Each of the last seven joints starts up to this far [rad] from the start posture.
             leader_settings: Keyword arguments of the task's leader.
 
@@ -87,10 +90,14 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
             raise UnknownNameError("render mode", render_mode, self.metadata["render_modes"])
         if arm not in self.arms:
             raise UnknownNameError(f"arm for {self.task}", arm, self.arms)
+        if rate not in RATES:
+            raise UnknownNameError("control rate", rate, map(str, RATES))
         self.arm = Arm.preset(arm)
         # Tasks are measured from a Panda's shoulder: objects before an arm that is taller stand higher, too.
         self.shoulder_offset = shoulder_offset(self.arm)
-        self.max_steps = registration(self.task).max_steps
+        self.rate = rate
+        self.metadata = {**self.metadata, "render_fps": rate}  # pyright: ignore[reportIncompatibleVariableOverride, reportAttributeAccessIssue]
+        self.max_steps = registration(self.task).max_steps * rate // RATE
         self.render_mode = render_mode
         self._start_range = span("start_range", start_range)
         self.model = self.world_spec().compile()
@@ -98,7 +105,8 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
         self.robot = RobotModel.of(self.model, self.arm)
         self._fingers = [{self.model.body(name).id} for name in FINGER_BODIES]
         self._obstacles = {self.model.body(name).id for name in self.obstacles}
-        self._substeps = round(1 / RATE / self.model.opt.timestep)
+        self._substeps = round(1 / rate / self.model.opt.timestep)
+        self._success_steps_needed = math.ceil(SUCCESS_TIME * rate)
         self._cameras = Cameras(self.model, cameras, image_size, (visualization_height, visualization_width))
         self._observer = Observer(self.arm, self.robot, self.objects, self._cameras)
         self._steps = self._success_steps = 0
@@ -136,6 +144,9 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
     @abstractmethod
     def _fails(self) -> str:
         """Name of an irreversible failure, empty if there is none."""
+
+    def _grip(self, opening: float) -> None:
+        """What a gripper told to have this opening in [0, 1] does besides moving its fingers."""
 
     def _collision(self) -> str:
         """Name of the failure if the robot collides with an obstacle in this state."""
@@ -237,13 +248,14 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
         self.robot.command(self.data, command[:-1], command[-1])
         mujoco.mj_step(self.model, self.data, nstep=self._substeps)
         mujoco.mj_forward(self.model, self.data)  # poses and contacts at the new positions
+        self._grip(command[-1])
         self._steps += 1
         failure = self._fails()
         if not failure and contact_force(self.model, self.data, self.robot.bodies, self._obstacles) > COLLISION_FORCE:
             failure = self._collision()
         goal = not failure and self._succeeds()
         self._success_steps = self._success_steps + 1 if goal else 0
-        success = self._success_steps >= SUCCESS_STEPS
+        success = self._success_steps >= self._success_steps_needed
         terminated = success or bool(failure)
         truncated = not terminated and self._steps >= self.max_steps
         if truncated:

@@ -44,6 +44,8 @@ VIEWS = (
     View("wrist2", "panda_hand", (-0.075, 0.0, 0.02), (0.0, 0.0, 0.15), 70, up=(1.0, 0.0, 0.0)),
     # Over the robot's left shoulder into the workspace.
     View("shoulder", "world", (-0.10, 0.50, 1.20), (0.60, 0.0, 0.55), 58),
+    # Opposite the robot, as RLBench's front camera.
+    View("front", "world", (1.45, 0.0, 0.95), (0.35, 0.0, 0.25), 55),
     # For people: the whole scene from the right.
     View(SHOWCASE, "world", (-0.12, -1.55, 1.05), (0.30, 0.0, 0.47), 44),
 )

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from sim_tasks.world.props import BOX, CYLINDER
+from sim_tasks.world.props import BOX, CAPSULE, CYLINDER
 
-CAPSULE, ELLIPSOID = mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_ELLIPSOID
+ELLIPSOID = mujoco.mjtGeom.mjGEOM_ELLIPSOID
 
 Rgba = tuple[float, float, float, float]
 Triple = tuple[float, float, float]

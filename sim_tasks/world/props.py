@@ -6,10 +6,12 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
-BOX, CYLINDER, MESH = (
+BOX, CYLINDER, MESH, SPHERE, CAPSULE = (
     mujoco.mjtGeom.mjGEOM_BOX,
     mujoco.mjtGeom.mjGEOM_CYLINDER,
     mujoco.mjtGeom.mjGEOM_MESH,
+    mujoco.mjtGeom.mjGEOM_SPHERE,
+    mujoco.mjtGeom.mjGEOM_CAPSULE,
 )
 
 

@@ -12,6 +12,7 @@ from er_il.arms.urdf import find_mesh, parse_urdf
 from er_il.kinematics.solver import kinematics_of
 
 SHOULDER = "panda_link1"  # the link that turns the upper arm; the tasks are measured from a Panda's
+HAND, TIP = "panda_hand", "panda_hand_tcp"  # the hand, and the point between its fingertips
 FINGERS = ("panda_finger_joint1", "panda_finger_joint2")
 FINGER_BODIES = ("panda_leftfinger", "panda_rightfinger")
 FINGER_TRAVEL = 0.04  # [m] each finger, from closed to open

@@ -41,7 +41,7 @@ class PickLeader[Task: PickTask](Leader[Task]):
     def _script(self, rng: np.random.Generator) -> tuple[Sequence[Segment], float]:
         world = self._world
         approach, retreat = self._keyframes(rng)
-        self._collisions.place({name: world.data.joint(name).qpos for name in world.objects})
+        self._collisions.copy(world.data)
         to_grasp = plan_path(world.arm, world.joint_positions, approach, self._collisions.is_free)
         carry = plan_path(world.arm, to_grasp[-1], retreat, self._collisions.is_free)
         speed, closing = self._draw_speed(rng), self._draw_closing(rng)

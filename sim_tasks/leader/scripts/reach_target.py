@@ -1,0 +1,21 @@
+"""The scripts of the tasks that are done once the arm is somewhere."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sim_tasks.leader.hand import hand_pose
+from sim_tasks.leader.motion import Keyframe
+from sim_tasks.leader.scripts.moves import Move, MovesLeader
+from sim_tasks.tasks.reach_target import BALL, ReachTarget
+
+PITCH = np.radians(80)  # of the hand below the horizontal
+
+
+class ReachTargetLeader(MovesLeader[ReachTarget]):
+    """Any elbow will do."""
+
+    def _moves(self, rng: np.random.Generator) -> Sequence[Move]:
+        x, y, z = self._world.position(BALL)
+        yaw = float(np.arctan2(y, x))
+        return [Move([Keyframe(hand_pose(np.array([x, y, z]), PITCH, yaw), None)], 1.0)]
