@@ -72,6 +72,24 @@ class DemonstrableEnv(ArmEnv, Protocol):
         ...
 
 
+@runtime_checkable
+class LearnableEnv(ArmEnv, Protocol):
+    """An arm environment for reinforcement learning: its reward is in [0, 1], and it tells more of its state.
+
+    It is made for a control ``rate`` [Hz], and judges on beyond success as a :class:`DemonstrableEnv` does.
+    """
+
+    @property
+    def joint_velocities(self) -> Vector:
+        """The arm's true joint velocities (n,) [rad/s]."""
+        ...
+
+    @property
+    def grasped(self) -> bool:
+        """True if the hand holds a thing."""
+        ...
+
+
 def arm_env(env: gymnasium.Env[Any, Any]) -> ArmEnv:
     """The arm environment under an environment's wrappers.
 
@@ -88,6 +106,15 @@ def demonstrable_env(env: gymnasium.Env[Any, Any]) -> DemonstrableEnv:
         ErIlError: it is none, or has no leader.
     """
     return _inner(env, DemonstrableEnv, "arm environment with a leader")
+
+
+def learnable_env(env: gymnasium.Env[Any, Any]) -> LearnableEnv:
+    """The arm environment under an environment's wrappers, with what reinforcement learning observes.
+
+    Raises:
+        ErIlError: it is none.
+    """
+    return _inner(env, LearnableEnv, "environment for reinforcement learning")
 
 
 def _inner[T: ArmEnv](env: gymnasium.Env[Any, Any], protocol: type[T], what: str) -> T:

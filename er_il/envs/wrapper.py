@@ -10,7 +10,7 @@ from er_il.arms.arm import Vector
 from er_il.control.commander import BEST_EFFORT, DecodedAhead, Tally
 from er_il.control.vector_commander import VectorCommander
 from er_il.envs.decoders import Decoder
-from er_il.envs.protocol import arm_env
+from er_il.envs.protocol import BEYOND_SUCCESS, arm_env
 from er_il.envs.tasks import task_id
 from er_il.spaces.base import ArmSpace
 from er_il.spaces.layout import Layout
@@ -45,7 +45,8 @@ class ActionSpaceEnv(
         layout = Layout.of_space(space)
         self._commander = VectorCommander(layout, 1.0 / env.metadata["render_fps"], on_invalid)
         self.ahead: DecodedAhead | None = None  # the next step's action, if it is decoded already
-        self._last: Step | None = None  # of the episode that goes on
+        self._last: Step | None = None  # of an episode that has ended
+        self._beyond_success = False
         self._started = False
         low, high = (np.append(bound, opening) for bound, opening in zip(space.bounds, (0.0, 1.0), strict=True))
         self.action_space = gymnasium.spaces.Box(low.astype(np.float32), high.astype(np.float32))
@@ -55,10 +56,16 @@ class ActionSpaceEnv(
         """Counts of the episode's decoded actions."""
         return self._commander.arms[0].tally
 
+    @property
+    def last_command(self) -> Vector:
+        """The joint angles (n,) [rad] that were commanded last, which a delta counts from."""
+        return self._commander.arms[0].last
+
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Start an episode; LeRobot's own options are for its wrappers and end here."""
         own = {name: value for name, value in (options or {}).items() if not name.startswith(LEROBOT_OPTIONS)}
         observation, info = self.env.reset(seed=seed, options=own)
+        self._beyond_success = bool(own.get(BEYOND_SUCCESS))
         self._commander.reset(self._measured())
         self.ahead, self._last, self._started = None, None, True
         return observation, info
@@ -72,7 +79,7 @@ class ActionSpaceEnv(
         (own,), _ = self._commander.split_action(action)
         if not self._started:
             raise NotResetError
-        return own, self.world.joint_positions, self._commander.arms[0].last
+        return own, self.world.joint_positions, self.last_command
 
     def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Decode an action, and take the step that it commands.
@@ -95,7 +102,8 @@ class ActionSpaceEnv(
             terminated = True
             info["failure"] = INVALID_ACTION
         step = observation, float(reward), terminated, truncated, info
-        self._last = step if terminated or truncated else None
+        goes_on = info["is_success"] and self._beyond_success and not truncated
+        self._last = step if (terminated or truncated) and not goes_on else None
         return step
 
     def _measured(self) -> Vector:

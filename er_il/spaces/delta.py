@@ -91,12 +91,8 @@ class DeltaSpace(ArmSpace):
     def _encode(self, q: Array) -> Array:
         space = self.absolute
         if isinstance(space, PoseSpace):
-            T_base_ee = space.kinematics.fk_batch(q)
-            R = Rotation.from_matrix(T_base_ee[:, :3, :3])
-            turns = (R[1:] * R[:-1].inv()).as_rotvec()
-            changes = np.column_stack(
-                [np.diff(T_base_ee[:, :3, 3], axis=0), turns, np.diff(space.redundancy_along(q), axis=0)]
-            )
+            shifts, turns = self._pose_changes(space.kinematics.fk_batch(q), q)
+            changes = np.column_stack([shifts, turns.as_rotvec(), np.diff(space.redundancy_along(q), axis=0)])
         else:
             changes = np.diff(q, axis=0)
         excess = np.abs(changes) > self.limits * (1.0 + TOLERANCE)
@@ -107,6 +103,11 @@ class DeltaSpace(ArmSpace):
                 f"the declared bound is {self.limits[dimension]:.3g}."
             )
         return np.vstack([np.zeros(self.dim), changes])
+
+    def _pose_changes(self, T_base_ee: Array, q: Array) -> tuple[Array, Rotation]:
+        """Translations (N-1, 3) [m] and rotations between the poses (N, 4, 4) of successive q (N, n) [rad]."""
+        R = Rotation.from_matrix(T_base_ee[:, :3, :3])
+        return np.diff(T_base_ee[:, :3, 3], axis=0), R[1:] * R[:-1].inv()
 
     def _decode(self, action: Vector, seed: Vector, current: Vector) -> IkResult:
         change = np.clip(action, *self.bounds)
@@ -120,10 +121,14 @@ class DeltaSpace(ArmSpace):
 
     def _target(self, space: PoseSpace, change: Vector, current: Vector) -> tuple[Array, Vector]:
         """The pose (4, 4) and the redundancy values to which a change leads from the last command."""
-        T_base_ee = space.kinematics.fk(current)
+        T_base_ee = self._start(space, change, current)
         T_base_ee[:3, 3] += change[:3]
         T_base_ee[:3, :3] = Rotation.from_rotvec(change[3:6]).as_matrix() @ T_base_ee[:3, :3]
         return T_base_ee, space.redundancy_along(current[None])[0] + change[6:]
+
+    def _start(self, space: PoseSpace, change: Vector, current: Vector) -> Array:
+        """The pose (4, 4) from which the change of the pose counts."""
+        return space.kinematics.fk(current)
 
     def _details(self) -> dict[str, Any]:
         return {**self.absolute._details(), "bounds": asdict(self.delta_bounds)}

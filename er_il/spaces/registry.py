@@ -10,6 +10,7 @@ from er_il.kinematics.redundancy import JointAngle, Redundancy
 from er_il.kinematics.rotation import Quaternion, RotationCode, make_rotation
 from er_il.kinematics.solver import kinematics_of
 from er_il.spaces.base import ArmSpace
+from er_il.spaces.carried import CARRIED, CarriedDeltaSpace
 from er_il.spaces.delta import PREFIX, DeltaBounds, DeltaSpace
 from er_il.spaces.joint import JOINT, JointSpace
 from er_il.spaces.pose import TASK, PoseSpace
@@ -31,6 +32,7 @@ def _arm_angle(arm: Arm) -> Redundancy:
 ERJ, ERA = "erj", "era"
 REDUNDANCIES: dict[str, Callable[[Arm], Redundancy]] = {ERJ: _joint_angle, ERA: _arm_angle}  # of the ER spaces
 SPACES = (JOINT, TASK, *REDUNDANCIES)
+RELATIVE: dict[str, type[DeltaSpace]] = {PREFIX: DeltaSpace, CARRIED: CarriedDeltaSpace}  # by the prefix of the name
 
 AT, AND = "@", "+"  # as in erj@panda_joint3, or erj@panda_joint1+panda_joint3 with two redundant joints
 
@@ -46,7 +48,8 @@ def make_arm_space(
     """Build the action space of an arm, without a gripper, by name.
 
     Args:
-        name: ``joint``, ``task``, ``erj`` or ``era``; with ``delta_`` in front, changes of its commands.
+        name: ``joint``, ``task``, ``erj`` or ``era``; with ``delta_`` in front, changes of its commands, and with
+            ``carried_`` such that the pose's target moves along with ERJ's joint (:mod:`er_il.spaces.carried`).
             ``erj@<joint>`` commands another than the arm's default joint; several are joined by ``+``.
         arm: The arm it commands.
         rotation: ``quat`` or ``rot6d``; the quaternion's hemisphere is that of the arm's home pose.
@@ -62,8 +65,9 @@ def make_arm_space(
     kind, joints = split_name(name)
     arm = arm.commanding(joints) if joints else arm
     code = make_rotation(rotation, kinematics_of(arm).fk(arm.home)[:3, :3])
-    space = _absolute(kind.removeprefix(PREFIX), arm, code, posture)
-    return DeltaSpace(arm, space, bounds or DeltaBounds.of_arm(arm)) if kind.startswith(PREFIX) else space
+    prefix, absolute = _split_kind(kind)
+    space = _absolute(absolute, arm, code, posture)
+    return RELATIVE[prefix](arm, space, bounds or DeltaBounds.of_arm(arm)) if prefix else space
 
 
 def split_name(name: str) -> tuple[str, tuple[str, ...]]:
@@ -73,11 +77,18 @@ def split_name(name: str) -> tuple[str, tuple[str, ...]]:
         UnknownNameError: no such kind, or joints for a kind that commands none.
     """
     kind, at, joints = name.partition(AT)
-    if kind.removeprefix(PREFIX) not in SPACES:
-        raise UnknownNameError("action space", kind, [*SPACES, *(PREFIX + space for space in SPACES)])
-    if at and (kind.removeprefix(PREFIX) != ERJ or not joints):
+    prefix, absolute = _split_kind(kind)
+    if absolute not in SPACES or (prefix == CARRIED and absolute != ERJ):
+        raise UnknownNameError("action space", kind, [*SPACES, *(PREFIX + space for space in SPACES), CARRIED + ERJ])
+    if at and (absolute != ERJ or not joints):
         raise UnknownNameError("action space", name, [*SPACES, f"{ERJ}{AT}JOINT"])
     return kind, tuple(joints.split(AND)) if at else ()
+
+
+def _split_kind(kind: str) -> tuple[str, str]:
+    """Split a kind into the prefix of its changes, "" for an absolute space, and the absolute space's kind."""
+    prefix = next((prefix for prefix in RELATIVE if kind.startswith(prefix)), "")
+    return prefix, kind.removeprefix(prefix)
 
 
 def check_space(name: str) -> None:
@@ -88,7 +99,7 @@ def check_space(name: str) -> None:
 
 def name_of(space: ArmSpace, arm: Arm) -> str:
     """Name a space as :func:`make_arm_space` would make it for ``arm``."""
-    commands_others = space.kind.removeprefix(PREFIX) == ERJ and space.arm.redundant != arm.redundant
+    commands_others = _split_kind(space.kind)[1] == ERJ and space.arm.redundant != arm.redundant
     return space.kind + (AT + AND.join(space.arm.redundant) if commands_others else "")
 
 
@@ -116,10 +127,10 @@ def arm_space_from_spec(spec: Mapping[str, Any], arm: Arm | None = None, *, post
         )
         if "hemisphere" in spec:
             rotation = Quaternion(tuple(spec["hemisphere"]))
-        absolute = split_name(kind)[0].removeprefix(PREFIX)
+        prefix, absolute = _split_kind(split_name(kind)[0])
         space = _absolute(absolute, arm, rotation, posture, spec)
-        if kind.startswith(PREFIX):
-            space = DeltaSpace(arm, space, DeltaBounds(**spec["bounds"]))
+        if prefix:
+            space = RELATIVE[prefix](arm, space, DeltaBounds(**spec["bounds"]))
         expected = {key: described[key] for key in ("joints", "base_frame", "ee_frame", "redundant", "fingerprint")}
     except KeyError as error:
         raise SpecError(f"Action spec has no {error}.") from error

@@ -108,7 +108,7 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
         self._substeps = round(1 / rate / self.model.opt.timestep)
         self._success_steps_needed = math.ceil(SUCCESS_TIME * rate)
         self._cameras = Cameras(self.model, cameras, image_size, (visualization_height, visualization_width))
-        self._observer = Observer(self.arm, self.robot, self.objects, self._cameras)
+        self._observer = Observer(self.arm, self.model, self.robot, self.objects, self._cameras)
         self._steps = self._success_steps = 0
         self._targets = JointTargets(self.arm)
         self.action_space = self._targets.space
@@ -181,6 +181,16 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
         return self.robot.joint_positions(self.data)
 
     @property
+    def joint_velocities(self) -> Vector:
+        """The follower's true joint velocities (n,) [rad/s]."""
+        return self.data.qvel[self.robot.joint_dofs]
+
+    @property
+    def grasped(self) -> bool:
+        """True if the hand holds a thing."""
+        return False
+
+    @property
     def gripper_opening(self) -> float:
         """The gripper's true opening in [0, 1]."""
         return self.robot.opening(self.data)
@@ -251,7 +261,7 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
         self._grip(command[-1])
         self._steps += 1
         failure = self._fails()
-        if not failure and contact_force(self.model, self.data, self.robot.bodies, self._obstacles) > COLLISION_FORCE:
+        if not failure and self._collides():
             failure = self._collision()
         goal = not failure and self._succeeds()
         self._success_steps = self._success_steps + 1 if goal else 0
@@ -263,6 +273,11 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
         terms = self.reward.terms(self._progress(), goal)
         info = {"is_success": success, "failure": failure, "reward_terms": terms}
         return self._observer.observe(self.data), total(terms), terminated, truncated, info
+
+    def _collides(self) -> bool:
+        if not self._obstacles:
+            return False
+        return contact_force(self.model, self.data, self.robot.bodies, self._obstacles) > COLLISION_FORCE
 
     def leader(self, seed: int) -> Iterator[np.ndarray]:
         """Demonstrate the episode just reset.

@@ -6,7 +6,6 @@ from typing import Any
 import gymnasium as gym
 import mujoco
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from er_il.arms.arm import Arm
 from er_il.kinematics.rotation import Quaternion, make_rotation
@@ -15,14 +14,19 @@ from er_il.support.shapes import POSE_NAMES
 from sim_tasks.world.camera import Cameras
 from sim_tasks.world.robot import RobotModel
 
+XYZW = [1, 2, 3, 0]  # order of a quaternion's entries, whose real part MuJoCo has first
+
 
 class Observer:
     """Measures ``agent_pos``, ``environment_state`` and, with cameras, ``pixels``."""
 
-    def __init__(self, arm: Arm, robot: RobotModel, objects: Sequence[str], cameras: Cameras) -> None:
-        """Observe ``robot``, the compiled ``arm``, and the poses of the bodies ``objects``."""
+    def __init__(
+        self, arm: Arm, model: mujoco.MjModel, robot: RobotModel, objects: Sequence[str], cameras: Cameras
+    ) -> None:
+        """Observe ``robot``, the ``arm`` compiled into ``model``, and the poses of the bodies ``objects``."""
         self._kinematics = kinematics_of(arm)
-        self._robot, self._objects, self._cameras = robot, tuple(objects), cameras
+        self._robot, self._cameras = robot, cameras
+        self._objects = np.array([model.body(name).id for name in objects])
         self._rotation = make_rotation(Quaternion.kind, self._kinematics.fk(arm.home)[:3, :3])
         self._quaternion = np.zeros(4)
         pose = ("ee.x", "ee.y", "ee.z", *Quaternion.names)
@@ -54,13 +58,15 @@ class Observer:
         """Observe a state; successive quaternions keep their sign, so that they do not jump."""
         q = self._robot.joint_positions(data)
         T_base_ee = self._kinematics.fk(q)
-        quaternion = Rotation.from_matrix(T_base_ee[:3, :3]).as_quat()
+        quaternion = np.empty(4)
+        mujoco.mju_mat2Quat(quaternion, T_base_ee[:3, :3].ravel())
+        quaternion = quaternion[XYZW]
         self._quaternion = quaternion if quaternion @ self._quaternion >= 0 else -quaternion
         agent = [q, [self._robot.opening(data)], T_base_ee[:3, 3], self._quaternion]
-        poses = [object_pose(data, name) for name in self._objects]
+        poses = np.concatenate([data.xpos[self._objects], data.xquat[self._objects][:, XYZW]], axis=1)
         observation: dict[str, Any] = {
             "agent_pos": np.concatenate(agent).astype(np.float32),
-            "environment_state": np.concatenate(poses).astype(np.float32),
+            "environment_state": poses.ravel().astype(np.float32),
         }
         if self._cameras.names:
             observation["pixels"] = self._cameras.images(data)
@@ -70,4 +76,4 @@ class Observer:
 def object_pose(data: mujoco.MjData, name: str) -> np.ndarray:
     """Position [m] and quaternion (x, y, z, w) of a body in the base frame, (7,)."""
     body = data.body(name)
-    return np.concatenate([body.xpos, body.xquat[[1, 2, 3, 0]]])
+    return np.concatenate([body.xpos, body.xquat[XYZW]])

@@ -52,6 +52,10 @@ class PickTask(ArmTask):
     def _fingers_on_target(self) -> int:
         return sum(touching(self.model, self.data, finger, self._target_body) for finger in self._fingers)
 
+    @property
+    def grasped(self) -> bool:
+        return self._held()
+
     def _held(self) -> bool:
         return self._fingers_on_target() == len(self._fingers)
 

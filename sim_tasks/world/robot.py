@@ -41,6 +41,7 @@ class RobotModel:
     """Addresses of the robot's joints and actuators in a compiled model."""
 
     joint_qpos: np.ndarray  # (n,) addresses in qpos
+    joint_dofs: np.ndarray  # (n,) addresses in qvel
     finger_qpos: np.ndarray  # (2,)
     actuators: np.ndarray  # (n,) ids
     gripper: int  # actuator id
@@ -52,6 +53,7 @@ class RobotModel:
         root = model.body(arm.base_frame).id
         return cls(
             joint_qpos=np.array([model.joint(joint).qposadr[0] for joint in arm.joints]),
+            joint_dofs=np.array([model.joint(joint).dofadr[0] for joint in arm.joints]),
             finger_qpos=np.array([model.joint(finger).qposadr[0] for finger in FINGERS]),
             actuators=np.array([model.actuator(joint).id for joint in arm.joints]),
             gripper=model.actuator(GRIPPER).id,

@@ -1,0 +1,187 @@
+"""Environments for reinforcement learning: delta actions of every space in [-1, 1], decided at 10 Hz (paper V-A).
+
+In every mode a decision takes the same simulated time, and deltas count from the last command. An action that the arm
+cannot do is invalid: the arm holds, and the step earns nothing.
+"""
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+from er_il.control.commander import BEST_EFFORT, HOLD
+from er_il.envs.learning_state import LearningState
+from er_il.envs.protocol import BEYOND_SUCCESS, learnable_env
+from er_il.envs.tasks import task_id, task_names
+from er_il.envs.wrapper import ActionSpaceEnv
+from er_il.kinematics.solver import Status
+from er_il.spaces.carried import CARRIED
+from er_il.spaces.delta import PREFIX, DeltaBounds, DeltaSpace
+from er_il.spaces.joint import JOINT
+from er_il.spaces.registry import AT, ERJ, SPACES, make_arm_space
+from er_il.support.episode_end import Step
+from er_il.support.errors import UnknownNameError
+from er_il.support.vectors import named_vector
+
+RATE = 10  # [Hz] of decisions
+BOUNDS = DeltaBounds(position=0.05, rotation=0.05, angle=0.075)  # the paper's largest changes of a decision
+SUCCESSES, INVALIDS = 10, 5  # in a row, after which an episode is truncated
+CAMERAS, IMAGE_SIZE = ("wrist", "front"), 84  # the paper's
+PIXELS, STATE = "pixels", "state"
+FREE = "-free"  # of ERJ as the paper's text defines it
+MODES = (*SPACES, ERJ + FREE)
+
+
+def space_name(mode: str) -> str:
+    """The action space of a mode: changes of a space's commands.
+
+    ``erj`` carries the hand along, as the paper's code does; ``erj-free`` is ERJ of its text. Both take the joints that
+    they command behind an ``@``, as in ``erj@panda_joint3``.
+
+    Raises:
+        UnknownNameError: no such mode.
+    """
+    kind, at, joints = mode.partition(AT)
+    if kind not in MODES:
+        raise UnknownNameError("mode", mode, MODES)
+    return (CARRIED if kind == ERJ else PREFIX) + kind.removesuffix(FREE) + at + joints
+
+
+class LearningEnv(gymnasium.Env[Any, NDArray[np.float32]]):
+    """A task as reinforcement learning sees it; stock libraries need nothing else.
+
+    Action: Box [-1, 1] of the mode's dimensions, in shares of the paper's largest changes, and the gripper, which is
+    open above 0. Observation: the state as a flat Box (:class:`er_il.envs.learning_state.LearningState`), or with
+    ``pixels`` a Dict of two images (84, 84, 3) and the robot's part of the state. Reward: the task's, in [0, 1].
+
+    An invalid action (its decoding is not OK; in joint space only what is not finite, since a joint stops at its limit)
+    holds the last command for the decision's time and earns 0. Failures that the task calls irreversible terminate an
+    episode, with reward 0; it is truncated after ``SUCCESSES`` successful steps or ``INVALIDS`` invalid actions in a
+    row, and at the task's time limit. ``info`` has ``is_success``, ``failure``, ``invalid``, ``invalid_actions`` (the
+    episode's count), ``decode_status`` and ``reward_terms``.
+    """
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": RATE}  # noqa: RUF012  as Gymnasium declares it
+
+    def __init__(
+        self,
+        task: str,
+        mode: str = ERJ,
+        *,
+        pixels: bool = False,
+        arm: str = "panda",
+        render_mode: str | None = None,
+        **settings: Any,
+    ) -> None:
+        """Make the task's environment in a mode.
+
+        Args:
+            task: Name of the task, or Gymnasium id of an environment that is learnable
+                (:class:`er_il.envs.protocol.LearnableEnv`).
+            mode: One of ``MODES``, see :func:`space_name`.
+            pixels: Observe images of the cameras wrist and front instead of the objects.
+            arm: Preset that does the task.
+            render_mode: ``rgb_array`` for :meth:`render`.
+            settings: Keyword arguments of the task, such as its randomisation.
+
+        Raises:
+            UnknownNameError: no such task, mode or arm for it.
+            ArmError: the arm has no such space.
+        """
+        cameras = {"cameras": CAMERAS, "image_size": IMAGE_SIZE} if pixels else {}
+        name = space_name(mode)
+        world = gymnasium.make(
+            task_id(task),
+            arm=arm,
+            rate=RATE,
+            render_mode=render_mode,
+            disable_env_checker=True,  # checks every step of the inner environment
+            **cameras,
+            **settings,
+        )
+        self.world = learnable_env(world)
+        space = make_arm_space(name, self.world.arm, bounds=BOUNDS)
+        assert isinstance(space, DeltaSpace)
+        self._invalid = {Status.INVALID} if mode == JOINT else set(Status) - {Status.OK}
+        self._env = ActionSpaceEnv(world, space, BEST_EFFORT if mode == JOINT else HOLD)
+        self._scale = space.limits
+        self._names = (*space.names, "gripper")
+        self._state = LearningState(self.world, objects=not pixels)
+        self.render_mode = render_mode
+        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (len(self._names),), np.float32)
+        self._pixels = pixels
+        state = self._state.space
+        self.observation_space = state
+        if pixels:
+            image = gymnasium.spaces.Box(0, 255, (IMAGE_SIZE, IMAGE_SIZE, 3), np.uint8)
+            self.observation_space = gymnasium.spaces.Dict({**dict.fromkeys(CAMERAS, image), STATE: state})
+        self._successes = self._invalids = self._invalid_actions = 0
+
+    @property
+    def observation_names(self) -> tuple[str, ...]:
+        """Names of the state's dimensions."""
+        return self._state.names
+
+    @property
+    def action_names(self) -> tuple[str, ...]:
+        """Names of an action's dimensions."""
+        return self._names
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Start an episode; for the options see the task."""
+        super().reset(seed=seed)
+        observation, info = self._env.reset(seed=seed, options={**(options or {}), BEYOND_SUCCESS: True})
+        self._successes = self._invalids = self._invalid_actions = 0
+        return self._observe(observation), info | {"invalid": False, "invalid_actions": 0}
+
+    def step(self, action: NDArray[np.float32]) -> Step:
+        """Take a decision of 0.1 s.
+
+        Raises:
+            ValueError: what came is no vector of the mode's dimensions, or no episode was started.
+        """
+        given = np.clip(named_vector("The action", action, self._names), -1.0, 1.0)
+        change = np.append(given[:-1] * self._scale, given[-1] > 0.0)
+        observation, reward, terminated, truncated, info = self._env.step(change)
+        invalid = Status(info["decode_status"]) in self._invalid
+        failed = terminated and bool(info["failure"])
+        self._invalids = self._invalids + 1 if invalid else 0
+        self._invalid_actions += invalid
+        self._successes = self._successes + 1 if info["is_success"] else 0
+        truncated = truncated or self._successes >= SUCCESSES or self._invalids >= INVALIDS
+        info = info | {"invalid": invalid, "invalid_actions": self._invalid_actions}
+        earned = 0.0 if invalid or failed else reward
+        return self._observe(observation), earned, failed, truncated and not failed, info
+
+    def render(self) -> Any:
+        """A picture (H, W, 3) uint8 of the scene for people."""
+        return self._env.render()
+
+    def close(self) -> None:
+        """Free the rendering contexts."""
+        self._env.close()
+
+    def _observe(self, observation: dict[str, Any]) -> Any:
+        state = self._state.observe(observation, self._env.last_command)
+        return {**observation[PIXELS], STATE: state} if self._pixels else state
+
+
+def make_rl_env(task: str, mode: str = ERJ, **settings: Any) -> LearningEnv:
+    """Make a task's environment for reinforcement learning; for the arguments see :class:`LearningEnv`."""
+    return LearningEnv(task, mode, **settings)
+
+
+def _register() -> None:
+    """Register every task that is there now in every mode: ``er_il/StackWine-erj-v0``."""
+    for task in task_names():
+        name = task_id(task).partition("/")[2].rpartition("-v")[0]
+        for mode in MODES:
+            gymnasium.register(
+                f"er_il/{name}-{mode}-v0",
+                entry_point=f"{__name__}:{LearningEnv.__name__}",
+                kwargs={"task": task, "mode": mode},
+            )
+
+
+_register()

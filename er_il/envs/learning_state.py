@@ -1,0 +1,79 @@
+"""The state that reinforcement learning observes, as one flat vector."""
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+from er_il.arms.arm import Vector
+from er_il.envs.protocol import LearnableEnv
+from er_il.kinematics.forward import forward_of
+from er_il.support.shapes import POSE_NAMES
+
+TURN_NAMES = (
+    "xx",
+    "xy",
+    "xz",
+    "yx",
+    "yy",
+    "yz",
+)  # its x and y axis: unlike quaternions unique
+
+
+class LearningState:
+    """Measures the robot's state and, relative to its hand, the objects and goals.
+
+    float32, in this order: joint angles [rad], joint velocities [rad/s], the gripper's opening, the end effector's
+    position [m] and axes, the elbow's position [m] (of arms that have one), the last command minus the joint angles
+    [rad], 1 if a thing is grasped; then for each object its position from the end effector [m] and its axes.
+    """
+
+    def __init__(self, world: LearnableEnv, objects: bool) -> None:
+        """Observe ``world``, with its ``objects`` or the robot alone."""
+        self._world, self._objects = world, objects
+        frames = world.arm.angle_frames
+        self._forward, self._elbow = forward_of(world.arm), frames.elbow if frames else None
+        joints = world.arm.joints
+        names = [f"{joint}.pos" for joint in joints] + [f"{joint}.vel" for joint in joints]
+        names += ["gripper", "ee.x", "ee.y", "ee.z", *(f"ee.{part}" for part in TURN_NAMES)]
+        names += ["elbow.x", "elbow.y", "elbow.z"] if self._elbow else []
+        names += [f"{joint}.left" for joint in joints] + ["grasped"]
+        if objects:
+            poses = world.environment_state_names[:: len(POSE_NAMES)]
+            for thing in (name.rpartition(".")[0] for name in poses):
+                names += [f"{thing}.{part}" for part in ("dx", "dy", "dz", *TURN_NAMES)]
+        self.names = tuple(names)
+        self.space = gymnasium.spaces.Box(-np.inf, np.inf, (len(names),), np.float32)
+
+    def observe(self, observation: dict[str, Any], command: Vector) -> NDArray[np.float32]:
+        """The state (len(names),), from the environment's observation and the last command (n,) [rad]."""
+        world, n = self._world, self._world.arm.dof
+        agent = observation["agent_pos"].astype(np.float64)
+        q, ee = world.joint_positions, agent[n + 1 : n + 4]
+        objects = observation["environment_state"].astype(np.float64).reshape(-1, 7) if self._objects else _NONE
+        turns = axes(np.vstack([agent[n + 4 :], objects[:, 3:]]))
+        parts = [q, world.joint_velocities, agent[n : n + 1], ee, turns[0]]
+        if self._elbow:
+            parts.append(self._forward.frame_pose(q, self._elbow)[:3, 3])
+        parts += [command - q, (float(world.grasped),), np.hstack([objects[:, :3] - ee, turns[1:]]).ravel()]
+        return np.concatenate(parts).astype(np.float32)
+
+
+_NONE = np.empty((0, 7))
+
+
+def axes(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The x and y axes (N, 6) of frames whose orientations are unit quaternions (N, 4) (x, y, z, w)."""
+    x, y, z, w = quaternions.T
+    return np.stack(
+        [
+            1 - 2 * (y * y + z * z),
+            2 * (x * y + z * w),
+            2 * (x * z - y * w),
+            2 * (x * y - z * w),
+            1 - 2 * (x * x + z * z),
+            2 * (y * z + x * w),
+        ],
+        axis=1,
+    )
