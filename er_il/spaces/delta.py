@@ -10,6 +10,7 @@ has no twin and no wrap, and its bound is a box.
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -55,6 +56,10 @@ class DeltaSpace(ArmSpace):
 
     @property
     def names(self) -> tuple[str, ...]:
+        return self._names
+
+    @cached_property
+    def _names(self) -> tuple[str, ...]:
         if isinstance(self.absolute, PoseSpace):
             return (*POSE_NAMES, *_changes(self.absolute.redundancy_names))
         return _changes(self.absolute.names)
@@ -63,7 +68,7 @@ class DeltaSpace(ArmSpace):
     def relative(self) -> bool:
         return True
 
-    @property
+    @cached_property
     def limits(self) -> Vector:
         """Largest magnitude (dim,) of each dimension [m or rad]."""
         bounds = self.delta_bounds

@@ -77,7 +77,8 @@ class RobotModel:
 
     def opening(self, data: mujoco.MjData) -> float:
         """Measured opening of the gripper in [0, 1]."""
-        return float(np.mean(data.qpos[self.finger_qpos]) / FINGER_TRAVEL)
+        left, right = data.qpos[self.finger_qpos].tolist()
+        return (left + right) / 2 / FINGER_TRAVEL
 
 
 def robot_spec(arm: Arm) -> mujoco.MjSpec:
