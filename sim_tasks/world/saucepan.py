@@ -57,7 +57,12 @@ class Saucepan:
             body.add_geom(name=f"{name}_{part}", type=CYLINDER, size=size, pos=position, rgba=colour, **seen)
         z, neck = 0.7 * self.height, 0.03
         body.add_geom(
-            name=f"{name}_neck", type=BOX, size=(neck / 2, 0.008, 0.005), pos=(r + neck / 2, 0, z), rgba=RIM_STEEL, **seen
+            name=f"{name}_neck",
+            type=BOX,
+            size=(neck / 2, 0.008, 0.005),
+            pos=(r + neck / 2, 0, z),
+            rgba=RIM_STEEL,
+            **seen,
         )
         body.add_geom(
             name=f"{name}_handle",
