@@ -8,6 +8,10 @@ from sim_tasks.tasks.carry_task import ARRIVED, MARK, GraspTask
 from sim_tasks.tasks.pick_and_lift import LEAST, PickAndLift
 from sim_tasks.tasks.pick_up_cup import LEFT
 from sim_tasks.tasks.take_lid_off_saucepan import LIFT, SAUCEPAN, TakeLidOffSaucepan
+from sim_tasks.world.blocks import BLOCK
+from sim_tasks.world.robot import FINGER_TRAVEL
+from sim_tasks.world.saucepan import KNOB_RADIUS
+from sim_tasks.world.tableware import CUP_RADIUS
 
 TASKS = {name: f"sim_tasks/{name}-v0" for name in ("TakeLidOffSaucepan", "PickAndLift", "PickUpCup")}
 
@@ -41,6 +45,18 @@ def test_a_grasp_completes_reaching_and_opening_the_fingers_loses_it_all(task: s
     terms = [world.step(open_hand)[4]["reward_terms"] for _ in range(10)][-1]
     assert not world.grasped and terms["lift"] == terms["success"] == 0.0
     assert 0.0 < terms["reach"] < weights["reach"]
+
+
+@pytest.mark.parametrize(
+    ("task", "radius"), [("TakeLidOffSaucepan", KNOB_RADIUS), ("PickAndLift", BLOCK / 2), ("PickUpCup", CUP_RADIUS)]
+)
+def test_fingers_that_close_at_once_stop_at_the_thing_and_hold_it_where_it_was_grasped(
+    task: str, radius: float
+) -> None:
+    world = make(task)
+    hold(world, lifted=0.05)
+    assert world.gripper_opening == pytest.approx(radius / FINGER_TRAVEL, abs=0.1)
+    assert np.linalg.norm(world.tip - world.grasp_point) < 0.01
 
 
 @pytest.mark.parametrize("task", ["TakeLidOffSaucepan", "PickAndLift"])
