@@ -6,9 +6,12 @@ A block between ``<!-- results/NAME -->`` and ``<!-- /results/NAME -->`` is the 
 
 import json
 import re
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
+from er_il.envs.decoders import DECODERS
 from er_il.evaluation.results import RESULTS
 from er_il.report.joints import joints_table
 from er_il.report.tables import markdown_table
@@ -28,6 +31,7 @@ TABLES = {
     "training_times": "training_time",
     "environment_steps": "throughput",
     "kills": "faults",
+    "replays": "replays",
     "cells": "success",
 }
 
@@ -38,6 +42,9 @@ def shown(report: dict[str, Any]) -> str:
         return joints_table(report)
     if "pooled" in report:
         return validity_table(report)
+    if all("rewards" in cell for cell in report.get("cells", [{}])):  # of er-il replay
+        cells = sorted(report["cells"], key=lambda cell: (cell["task"], list(DECODERS).index(cell["decoder"])))
+        report = {"replays": {task: list(of_task) for task, of_task in groupby(cells, itemgetter("task"))}}
     return markdown_table(table(next(name for key, name in TABLES.items() if key in report), **report))
 
 

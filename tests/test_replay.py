@@ -48,6 +48,8 @@ def test_joint_and_erj_repeat_the_demo_and_task_space_loses_the_elbow(datasets, 
     assert cell["interval"] == pytest.approx([0.1581, 1.0], abs=1e-4)
     assert report["cells"][1]["failures"] == {"collision": 2}
     assert cell["leader"] == {"starts": 3, "dropped": {"collision": 1}}
+    assert cell["rewards"]["first"] < 0.3 and cell["rewards"]["largest_fall"] < 0.01 and cell["rewards"]["last"] == 1.0
+    assert report["cells"][1]["rewards"]["last"] < 0.9  # a collision
     assert report["cells"][0]["leader"] == {"starts": 2, "dropped": {}}
     assert [demo["seed"] for demo in cell["demos"]] == [demo.seed for demo in read_episodes(datasets["joint"])]
 

@@ -11,13 +11,14 @@ from documented import ROOT, documented
 from PIL import Image
 
 from er_il.datasets.recipe import Recipe
-from sim_tasks import TASKS, TaskEntry
+from sim_tasks import RL_TASKS, TASKS, TaskEntry
 from sim_tasks.tasks.arm_task import RATE, ArmTask
 from sim_tasks.tasks.placement import Area
 
 BLOCK = 10  # [px] side of the blocks in which pictures are compared
 SAME = 14  # largest mean difference of a block between a picture and its compressed copy; an object moved by 2 cm: 20
 IMAGE = 128  # [px] side of a camera's image
+ALL = (*TASKS, *RL_TASKS)
 FAR_AWAY = (-50.0, 0.0, 0.0)  # x, y [m], yaw, where no camera sees it
 
 
@@ -39,7 +40,7 @@ def difference(one: np.ndarray, other: np.ndarray) -> float:
     return float(error.reshape(height, BLOCK, width, BLOCK).mean(axis=(1, 3)).max())
 
 
-@pytest.mark.parametrize("entry", TASKS)
+@pytest.mark.parametrize("entry", ALL)
 def test_the_published_picture_starts_as_the_world_of_today(entry: TaskEntry):
     script = render_tasks()
     published = moments(script["PICTURES"] / f"{entry.task}.webp")
@@ -98,7 +99,7 @@ def project(world: ArmTask, camera: str, points: np.ndarray) -> np.ndarray:
     return np.column_stack([IMAGE / 2 + focal * y / z, IMAGE / 2 - focal * x / z])
 
 
-@pytest.mark.parametrize("entry", TASKS)
+@pytest.mark.parametrize("entry", ALL)
 def test_the_page_says_how_long_and_how_much_varies(entry: TaskEntry):
     sections = (ROOT / "docs" / "tasks.md").read_text().split("\n## ")
     (section,) = [each for each in sections if f"`{entry.task}`" in each.splitlines()[0]]
@@ -108,7 +109,7 @@ def test_the_page_says_how_long_and_how_much_varies(entry: TaskEntry):
             assert f"{100 * sides[0]:g} × {100 * sides[1]:g} cm (`{key}`)" in section
 
 
-@pytest.mark.parametrize("entry", TASKS)
+@pytest.mark.parametrize("entry", ALL)
 def test_the_page_lists_the_reward_terms_with_their_weights(entry: TaskEntry):
     world = gymnasium.make(entry.id).unwrapped
     assert isinstance(world, ArmTask)

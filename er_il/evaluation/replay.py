@@ -40,6 +40,7 @@ class Replayed:
     deviation: float  # [rad] largest distance of a joint from where it was in the demo at that step, pushed or not
     max_joint_step: float  # [rad] largest joint change that a decoded action asked for
     statuses: Counter[str]  # of decoding, one a step
+    rewards: tuple[float, float, float]  # at the first step; largest fall below the highest so far; at the last step
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,11 @@ class ReplayCell:
                     "dropped": dict(self.dropped.most_common()),
                 },
                 "max_joint_deviation": max(demo.deviation for demo in self.demos),
+                "rewards": {
+                    "first": max(demo.rewards[0] for demo in self.demos),
+                    "largest_fall": max(demo.rewards[1] for demo in self.demos),
+                    "last": min(demo.rewards[2] for demo in self.demos),
+                },
                 "demos": [
                     {
                         "seed": demo.seed,
@@ -117,17 +123,21 @@ def replay_demo(world: ActionSpaceEnv, demo: RecordedEpisode) -> Replayed:
     deviation = joint_step = 0.0
     statuses: Counter[str] = Counter()
     info: dict[str, Any] = {}
+    rewards: list[float] = []
     for step, action in enumerate(actions):
         if step < len(joints):
             deviation = max(deviation, float(np.max(np.abs(world.world.joint_positions - joints[step]))))
-        _, _, terminated, truncated, info = world.step(action)
+        _, reward, terminated, truncated, info = world.step(action)
+        rewards.append(reward)
         statuses[info["decode_status"]] += 1
         joint_step = max(joint_step, info["joint_step"])
         if terminated or truncated:
             break
     success = bool(info["is_success"])
     failure = "" if success else info["failure"] or "unfinished"
-    return Replayed(demo.seed, success, failure, deviation, joint_step, statuses)
+    falls = np.maximum.accumulate(rewards) - rewards
+    told = rewards[0], float(falls.max()), rewards[-1]
+    return Replayed(demo.seed, success, failure, deviation, joint_step, statuses, told)
 
 
 def write_report(cells: Sequence[ReplayCell], meta: dict[str, Any], path: Path) -> None:
