@@ -1,0 +1,36 @@
+"""The script that puts rubbish into a bin."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sim_tasks.leader.hand import hand_pose
+from sim_tasks.leader.motion import Keyframe
+from sim_tasks.leader.scripts.moves import Move, MovesLeader
+from sim_tasks.tasks.put_rubbish_in_bin import BIN, HIGH, LOW, TOMATOES, PutRubbishInBin
+
+DOWN = np.radians(89.9)  # pitch of the hand
+ABOVE = np.array([0.0, 0.0, 0.12])  # [m] over the rubbish
+
+
+class PutRubbishInBinLeader(MovesLeader[PutRubbishInBin]):
+    """From above, and over the bin's rim; any elbow will do."""
+
+    avoid = (BIN, *TOMATOES)
+
+    def _moves(self, rng: np.random.Generator) -> Sequence[Move]:
+        world = self._world
+        rubbish, high, low = world.rubbish.copy(), world.above_rim(HIGH), world.above_rim(LOW)
+        yaw, bin_yaw = (float(np.arctan2(point[1], point[0])) for point in (rubbish, high))
+
+        def grasp(offset: np.ndarray, straight: bool = False) -> Keyframe:
+            return Keyframe(hand_pose(rubbish + offset, DOWN, yaw), None, straight)
+
+        over = Keyframe(hand_pose(high, DOWN, bin_yaw), None)
+        inside = Keyframe(hand_pose(low, DOWN, bin_yaw), None, straight=True)
+        back = Keyframe(over.T_base_ee, None, straight=True)
+        return [
+            Move([grasp(ABOVE + self._draw_via(rng)), grasp(np.zeros(3), straight=True)], 1.0),
+            Move([grasp(ABOVE, straight=True), over, inside], 0.0),
+            Move([back], 1.0),
+        ]
