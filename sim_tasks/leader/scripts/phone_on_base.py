@@ -1,0 +1,45 @@
+"""The script that puts a phone on its base."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sim_tasks.leader.hand import hand_pose
+from sim_tasks.leader.motion import Keyframe
+from sim_tasks.leader.scripts.moves import Move, MovesLeader
+from sim_tasks.tasks.phone_on_base import BASE, GRIP, PHONE, PhoneOnBase
+
+DOWN = np.radians(89.9)  # pitch of the hand over the bench
+ABOVE = np.array([0.0, 0.0, 0.12])  # [m] over the phone
+BEFORE = 0.08  # [m] from the cradle, out of it
+SEATED = 0.002  # [m] from which the phone is let go
+
+
+class PhoneOnBaseLeader(MovesLeader[PhoneOnBase]):
+    """Fingers at the handset's sides, into the cradle at a right angle to its slope; any elbow will do."""
+
+    avoid = (BASE, f"{BASE}_cradle")
+
+    def _moves(self, rng: np.random.Generator) -> Sequence[Move]:
+        world = self._world
+        grip, yaw = world.point(PHONE, GRIP), _yaw(world.rotation(PHONE))
+        rest = world.rest
+        seat, out, base_yaw = rest[:3, 3] + rest[:3, :3] @ GRIP, rest[:3, 2], _yaw(rest[:3, :3])
+        pitch = DOWN - world.station.slope
+
+        def grasp(offset: np.ndarray, straight: bool = False) -> Keyframe:
+            return Keyframe(hand_pose(grip + offset, DOWN, yaw), None, straight)
+
+        def cradle(distance: float, straight: bool = True) -> Keyframe:
+            return Keyframe(hand_pose(seat + distance * out, pitch, base_yaw), None, straight)
+
+        return [
+            Move([grasp(ABOVE + self._draw_via(rng)), grasp(np.zeros(3), straight=True)], 1.0),
+            Move([grasp(ABOVE, straight=True), cradle(BEFORE, straight=False), cradle(SEATED)], 0.0),
+            Move([cradle(BEFORE)], 1.0),
+        ]
+
+
+def _yaw(rotation: np.ndarray) -> float:
+    """Direction [rad] of a thing's x over the bench."""
+    return float(np.arctan2(rotation[1, 0], rotation[0, 0]))
