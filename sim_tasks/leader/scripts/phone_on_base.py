@@ -25,7 +25,7 @@ class PhoneOnBaseLeader(MovesLeader[PhoneOnBase]):
         grip, yaw = world.point(PHONE, GRIP), _yaw(world.rotation(PHONE))
         rest = world.rest
         seat, out, base_yaw = rest[:3, 3] + rest[:3, :3] @ GRIP, rest[:3, 2], _yaw(rest[:3, :3])
-        pitch = DOWN - world.station.slope
+        pitch = DOWN + world.station.slope
 
         def grasp(offset: np.ndarray, straight: bool = False) -> Keyframe:
             return Keyframe(hand_pose(grip + offset, DOWN, yaw), None, straight)
