@@ -71,7 +71,9 @@ class BaseStation:
         cradle.add_geom(type=BOX, size=(lip, self.half_width, 2 * low), pos=(end, 0, 2 * low), rgba=WHITE)
         seen = {"mass": 0, "contype": 0, "conaffinity": 0, "group": 2}
         cradle.add_geom(type=BOX, size=(0.076, WIDTH / 2 + gap, 0.0005), pos=(0.0, 0, 0), rgba=BLACK, **seen)
-        cradle.add_geom(type=CYLINDER, size=(0.004, 0.002, 0), pos=(-0.070, 0.033, 0.0), rgba=(0.2, 0.9, 0.3, 1), **seen)
+        cradle.add_geom(
+            type=CYLINDER, size=(0.004, 0.002, 0), pos=(-0.070, 0.033, 0.0), rgba=(0.2, 0.9, 0.3, 1), **seen
+        )
         for y in (0.007, -0.007):  # contacts of the charger
             cradle.add_geom(type=BOX, size=(0.006, 0.003, 0.001), pos=(0.055, y, 0.0), rgba=(0.8, 0.7, 0.3, 1), **seen)
         return body

@@ -10,9 +10,11 @@ from sim_tasks.leader.scripts.moves import Move, MovesLeader
 from sim_tasks.tasks.phone_on_base import BASE, GRIP, PHONE, PhoneOnBase
 
 DOWN = np.radians(89.9)  # pitch of the hand over the bench
-ABOVE = np.array([0.0, 0.0, 0.12])  # [m] over the phone
-BEFORE = 0.08  # [m] from the cradle, out of it
+ABOVE = np.array([0.0, 0.0, 0.10])  # [m] over the phone
+BEFORE = 0.07  # [m] from the cradle, out of it
 SEATED = 0.002  # [m] from which the phone is let go
+CRADLE = 0.65  # pace into the cradle and out of it
+SIDEWAYS = (0.33, 0.45)  # paces of reaching and carrying: the follower lags with the hand's speed
 
 
 class PhoneOnBaseLeader(MovesLeader[PhoneOnBase]):
@@ -34,9 +36,12 @@ class PhoneOnBaseLeader(MovesLeader[PhoneOnBase]):
             return Keyframe(hand_pose(seat + distance * out, pitch, base_yaw), None, straight)
 
         return [
-            Move([grasp(ABOVE + self._draw_via(rng)), grasp(np.zeros(3), straight=True)], 1.0),
-            Move([grasp(ABOVE, straight=True), cradle(BEFORE, straight=False), cradle(SEATED)], 0.0),
-            Move([cradle(BEFORE)], 1.0),
+            Move([grasp(ABOVE + self._draw_via(rng))], 1.0, pace=SIDEWAYS[0]),
+            Move([grasp(np.zeros(3), straight=True)], 1.0),
+            Move([grasp(ABOVE, straight=True)], 0.0),
+            Move([cradle(BEFORE, straight=False)], 0.0, pace=SIDEWAYS[1]),
+            Move([cradle(SEATED)], 0.0, pace=CRADLE),
+            Move([cradle(BEFORE)], 1.0, pace=CRADLE),
         ]
 
 

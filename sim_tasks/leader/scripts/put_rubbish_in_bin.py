@@ -10,7 +10,8 @@ from sim_tasks.leader.scripts.moves import Move, MovesLeader
 from sim_tasks.tasks.put_rubbish_in_bin import BIN, HIGH, LOW, TOMATOES, PutRubbishInBin
 
 DOWN = np.radians(89.9)  # pitch of the hand
-ABOVE = np.array([0.0, 0.0, 0.12])  # [m] over the rubbish
+ABOVE = np.array([0.0, 0.0, 0.10])  # [m] over the rubbish
+SIDEWAYS = (0.31, 0.25)  # paces of reaching and carrying: the follower lags with the hand's speed
 
 
 class PutRubbishInBinLeader(MovesLeader[PutRubbishInBin]):
@@ -30,7 +31,10 @@ class PutRubbishInBinLeader(MovesLeader[PutRubbishInBin]):
         inside = Keyframe(hand_pose(low, DOWN, bin_yaw), None, straight=True)
         back = Keyframe(over.T_base_ee, None, straight=True)
         return [
-            Move([grasp(ABOVE + self._draw_via(rng)), grasp(np.zeros(3), straight=True)], 1.0),
-            Move([grasp(ABOVE, straight=True), over, inside], 0.0),
+            Move([grasp(ABOVE + self._draw_via(rng))], 1.0, pace=SIDEWAYS[0]),
+            Move([grasp(np.zeros(3), straight=True)], 1.0),
+            Move([grasp(ABOVE, straight=True)], 0.0),
+            Move([over], 0.0, pace=SIDEWAYS[1]),
+            Move([inside], 0.0),
             Move([back], 1.0),
         ]
