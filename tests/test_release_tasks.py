@@ -16,8 +16,8 @@ from sim_tasks.world.rubbish import PAPER_MIDDLE
 WORLDS = ("PutRubbishInBin", "PhoneOnBase")
 
 
-def make(name: str, **kwargs: object) -> Any:
-    world = gymnasium.make(f"sim_tasks/{name}-v0", **kwargs).unwrapped
+def make(name: str) -> Any:
+    world = gymnasium.make(f"sim_tasks/{name}-v0").unwrapped
     assert isinstance(world, ReleaseTask)
     return world
 

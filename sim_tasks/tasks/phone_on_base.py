@@ -77,7 +77,7 @@ class PhoneOnBase(ReleaseTask):
         """The handset's place in the cradle: its pose (4, 4) in the base frame."""
         T = np.eye(4)
         T[:3, :3] = self.rotation(BASE) @ self._rest_rotation
-        T[:3, 3] = self.point(BASE, self._rest_position)
+        T[:3, 3] = self.point(BASE, self._rest_position.tolist())
         return T
 
     def _in_place(self) -> bool:

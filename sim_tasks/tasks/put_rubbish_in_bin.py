@@ -91,7 +91,7 @@ class PutRubbishInBin(ReleaseTask):
 
     def _in_place(self) -> bool:
         in_bin = self.rotation(BIN).T @ (self.rubbish - self.position(BIN))
-        return self.bin.contains(in_bin, BELOW)
+        return self.bin.contains(in_bin.tolist(), BELOW)
 
     def _progress(self) -> dict[str, float]:
         if self._succeeds():

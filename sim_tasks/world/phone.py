@@ -1,6 +1,5 @@
 """A cordless phone: a free handset, and the base station with the cradle that it rests in."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -78,13 +77,13 @@ class BaseStation:
             cradle.add_geom(type=BOX, size=(0.006, 0.003, 0.001), pos=(0.055, y, 0.0), rgba=(0.8, 0.7, 0.3, 1), **seen)
         return body
 
-    def _add_wedge(
-        self, spec: mujoco.MjSpec, body: mujoco.MjsBody, position: Sequence[float], rotation: np.ndarray
-    ) -> None:
+    def _add_wedge(self, spec: mujoco.MjSpec, body: mujoco.MjsBody, position: np.ndarray, rotation: np.ndarray) -> None:
         sides = (self.half_width, -self.half_width)
-        top = [position + rotation @ (x, y, 0.0) for x in (-self.half_length, self.half_length) for y in sides]
+        top = [
+            position + rotation @ np.array([x, y, 0.0]) for x in (-self.half_length, self.half_length) for y in sides
+        ]
         (back, _, front, _), foot = top, 0.015  # [m] by which it stands out behind
-        bottom = [(x, y, 0.0) for x in (back[0] - foot, front[0]) for y in sides]
+        bottom = [np.array([x, y, 0.0]) for x in (back[0] - foot, front[0]) for y in sides]
         wedge = spec.add_mesh(name=body.name)
-        wedge.uservert = np.ravel([*top, *bottom])
+        wedge.uservert = np.concatenate([*top, *bottom])
         body.add_geom(type=MESH, meshname=body.name, rgba=CREAM)

@@ -13,27 +13,27 @@ DOWN = np.radians(89.9)  # pitch of the hand over the bench
 ABOVE = np.array([0.0, 0.0, 0.10])  # [m] over the phone
 BEFORE = 0.07  # [m] from the cradle, out of it
 SEATED = 0.002  # [m] from which the phone is let go
-CRADLE = 0.65  # pace into the cradle and out of it
-SIDEWAYS = (0.33, 0.45)  # paces of reaching and carrying: the follower lags with the hand's speed
+CRADLE = 0.6  # pace into the cradle and out of it
+SIDEWAYS = (0.36, 0.38)  # paces of reaching and carrying: the follower lags with the hand's speed
 
 
 class PhoneOnBaseLeader(MovesLeader[PhoneOnBase]):
-    """Fingers at the handset's sides, into the cradle at a right angle to its slope; any elbow will do."""
+    """Fingers at the handset's sides, into the cradle at a right angle to its slope; any elbow would do."""
 
     avoid = (BASE, f"{BASE}_cradle")
 
     def _moves(self, rng: np.random.Generator) -> Sequence[Move]:
         world = self._world
-        grip, yaw = world.point(PHONE, GRIP), _yaw(world.rotation(PHONE))
+        grip, yaw = world.point(PHONE, GRIP), _azimuth(world.rotation(PHONE)[:, 0])
         rest = world.rest
-        seat, out, base_yaw = rest[:3, 3] + rest[:3, :3] @ GRIP, rest[:3, 2], _yaw(rest[:3, :3])
+        seat, out, base_yaw = rest[:3, 3] + rest[:3, :3] @ GRIP, rest[:3, 2], _azimuth(rest[:3, 0])
         pitch = DOWN + world.station.slope
 
         def grasp(offset: np.ndarray, straight: bool = False) -> Keyframe:
-            return Keyframe(hand_pose(grip + offset, DOWN, yaw), None, straight)
+            return Keyframe(hand_pose(grip + offset, DOWN, yaw), _azimuth(grip), straight)
 
         def cradle(distance: float, straight: bool = True) -> Keyframe:
-            return Keyframe(hand_pose(seat + distance * out, pitch, base_yaw), None, straight)
+            return Keyframe(hand_pose(seat + distance * out, pitch, base_yaw), _azimuth(seat), straight)
 
         return [
             Move([grasp(ABOVE + self._draw_via(rng))], 1.0, pace=SIDEWAYS[0]),
@@ -45,6 +45,6 @@ class PhoneOnBaseLeader(MovesLeader[PhoneOnBase]):
         ]
 
 
-def _yaw(rotation: np.ndarray) -> float:
-    """Direction [rad] of a thing's x over the bench."""
-    return float(np.arctan2(rotation[1, 0], rotation[0, 0]))
+def _azimuth(vector: np.ndarray) -> float:
+    """Direction [rad] of a vector over the bench."""
+    return float(np.arctan2(vector[1], vector[0]))
