@@ -1,0 +1,103 @@
+"""Phone on Base: put a cordless phone's handset into the cradle of its base station (paper V-A)."""
+
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from sim_tasks.tasks.object_task import WIDTH, yawed
+from sim_tasks.tasks.placement import Placement
+from sim_tasks.tasks.release_task import ReleaseTask
+from sim_tasks.tasks.rewards import Reward, proximity
+from sim_tasks.world.phone import HANDSET, LENGTH, BaseStation
+from sim_tasks.world.randomisation import sides, span
+
+PHONE, BASE = "phone", "base"
+GRIP = (0.0, 0.0, 0.020)  # [m] where the fingers take the handset, in its frame
+NEAR, TILT = 0.02, np.radians(15)  # [m], [rad] from its place within which the handset is on the base
+ENDS = np.array([[-LENGTH / 2, 0.0, 0.0], [LENGTH / 2, 0.0, 0.0]])  # [m] in the handset's frame
+
+
+class PhoneOnBase(ReleaseTask):
+    """The handset in the cradle and out of the hand."""
+
+    task = "phone_on_base"
+    task_description = "Put the phone on its base."
+    objects = (PHONE, BASE)
+    graspable = (PHONE,)
+    station = BaseStation()
+    centre, base_place = (0.45, -0.13), (0.50, 0.22)  # x, y [m] of the middles of their places
+    reward = Reward(reach=0.3, place=0.3, open=0.2, success=0.2)
+
+    def __init__(
+        self,
+        *,
+        phone_range: tuple[float, float] = (0.20, 0.25),
+        phone_yaw_range: float = 0.7854,
+        base_range: tuple[float, float] = (0.10, 0.10),
+        base_yaw_range: float = 0.5,
+        **kwargs: Any,
+    ) -> None:
+        """Build the task.
+
+        Args:
+            phone_range: Sides [m] of the rectangle in which the handset lies.
+            phone_yaw_range: The handset is turned up to this far [rad].
+            base_range: Sides [m] of the rectangle in which the base station stands.
+            base_yaw_range: The base station is turned up to this far [rad].
+            kwargs: See :class:`sim_tasks.tasks.object_task.ObjectTask`.
+        """
+        self._phone_range = sides("phone_range", phone_range)
+        self._phone_yaw_range = span("phone_yaw_range", phone_yaw_range)
+        self._base_range = sides("base_range", base_range)
+        self._base_yaw_range = span("base_yaw_range", base_yaw_range)
+        self._rest_position, self._rest_rotation = self.station.rest
+        super().__init__(**kwargs)
+
+    def _build(self, spec: mujoco.MjSpec) -> None:
+        self.station.add(spec, BASE)
+        HANDSET.add(spec, PHONE, (*self.centre, 0.0))
+
+    def _draw(self, rng: np.random.Generator) -> Placement:
+        placement: Placement = {}
+        for name, centre, area, turn in (
+            (PHONE, self.centre, self._phone_range, self._phone_yaw_range),
+            (BASE, self.base_place, self._base_range, self._base_yaw_range),
+        ):
+            x, y = np.array(centre) + (rng.random(2) - 0.5) * area
+            placement[name] = (x, y, rng.uniform(-turn, turn))
+        return placement
+
+    def _arrange(self, placement: Placement) -> None:
+        for name, (x, y, yaw) in placement.items():
+            self._put(name, (x, y, 0.0), yawed(yaw))
+
+    @property
+    def rest(self) -> np.ndarray:
+        """The handset's place in the cradle: its pose (4, 4) in the base frame."""
+        T = np.eye(4)
+        T[:3, :3] = self.rotation(BASE) @ self._rest_rotation
+        T[:3, 3] = self.point(BASE, self._rest_position.tolist())
+        return T
+
+    def _in_place(self) -> bool:
+        rest, rotation = self.rest, self.rotation(PHONE)
+        turn = np.arccos(np.clip((np.sum(rest[:3, :3] * rotation) - 1) / 2, -1.0, 1.0))
+        return bool(np.linalg.norm(self.position(PHONE) - rest[:3, 3]) < NEAR and turn < TILT)
+
+    def _left(self) -> float:
+        """Mean distance [m] of the handset's ends from theirs in the cradle: to be moved and to be turned."""
+        rest = self.rest
+        ends = self.position(PHONE) + ENDS @ self.rotation(PHONE).T
+        return float(np.mean(np.linalg.norm(ends - (rest[:3, 3] + ENDS @ rest[:3, :3].T), axis=1)))
+
+    def _progress(self) -> dict[str, float]:
+        if self._in_place():
+            return {"reach": 1.0, "place": 1.0, "open": self.commanded_opening if self.grasped else 1.0}
+        if self.grasped:
+            return {"reach": 1.0, "place": proximity(self._left(), WIDTH), "open": 0.0}
+        return {
+            "reach": proximity(float(np.linalg.norm(self.tip - self.point(PHONE, GRIP))), WIDTH),
+            "place": 0.0,
+            "open": 0.0,
+        }
