@@ -13,6 +13,7 @@ PITCH = np.radians(40)  # of the hand below the horizontal
 BACK = 0.10  # [m] via point, from the grasp back along the hand
 LIFT = 0.05  # [m] by which the tip ends above the rim
 CLOSED = 0.2
+PACE = 0.8  # share of the script's speed
 
 
 class TakeUmbrellaOutOfStandLeader(MovesLeader[TakeUmbrellaOutOfStand]):
@@ -28,6 +29,6 @@ class TakeUmbrellaOutOfStandLeader(MovesLeader[TakeUmbrellaOutOfStand]):
         lifted = grasp.copy()
         lifted[2, 3] += stand.height - stand.floor + LIFT
         return [
-            Move([Keyframe(via, None), Keyframe(grasp, None, straight=True)], 1.0),
-            Move([Keyframe(lifted, None, straight=True)], CLOSED),
+            Move([Keyframe(via, None), Keyframe(grasp, None, straight=True)], 1.0, pace=PACE),
+            Move([Keyframe(lifted, None, straight=True)], CLOSED, pace=PACE),
         ]
