@@ -1,5 +1,6 @@
 """Stack Wine: lay a standing bottle into the free place of a wine rack (paper V-A)."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import mujoco
@@ -28,7 +29,10 @@ class StackWine(ObjectTask):
     graspable = (BOTTLE,)
     arms = ("panda", "panda8")
     rack = WineRack()
-    centres = {BOTTLE: (0.47, 0.22), RACK: (0.46, -0.22)}  # noqa: RUF012  x, y [m] of the middle of their places
+    centres: Mapping[str, tuple[float, float]] = {
+        BOTTLE: (0.47, 0.22),
+        RACK: (0.46, -0.22),
+    }  # x, y [m] of the middle of their places
     rack_yaw = 2 * np.pi / 3  # the bottle's neck to the left and back
     reward = Reward(reach=0.3, stack=0.5, success=0.2)
 

@@ -1,6 +1,7 @@
 """A folded umbrella, and the stand in which it stands."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import mujoco
 import numpy as np
@@ -21,7 +22,7 @@ def _hook() -> tuple[Primitive, ...]:
     ends = np.column_stack([_BEND * (1 + np.cos(angles)), np.zeros(6), _BEND_HEIGHT + _BEND * np.sin(angles)])
     ends = np.vstack([ends, ends[-1] - (0.0, 0.0, 0.012)])
     parts = []
-    for one, other in zip(ends[:-1], ends[1:], strict=True):
+    for one, other in pairwise(ends):
         x, y, z = ((one + other) / 2).tolist()
         dx, _, dz = other - one
         half = float(np.hypot(dx, dz)) / 2
@@ -52,10 +53,10 @@ UMBRELLA = Thing(
         *_hook(),
     ),
     touch=(
-        (Primitive(BOX, (0.009, 0.009, 0.004), (0.0, 0.0, 0.004)), 0.2),  # on which it stands by itself
+        (Primitive(BOX, (0.009, 0.009, 0.004), (0.0, 0.0, 0.004)), 0.25),  # on which it stands by itself
         (Primitive(CAPSULE, (0.023, 0.120, 0.0), (0.0, 0.0, 0.165)), 0.6),
         (Primitive(CAPSULE, (_HANDLE_RADIUS, 0.055, 0.0), (0.0, 0.0, 0.345)), 0.1),
-        (Primitive(BOX, (0.020, 0.009, 0.020), (0.036, 0.0, 0.412)), 0.1),  # the hook
+        (Primitive(BOX, (0.020, 0.009, 0.020), (0.036, 0.0, 0.412)), 0.05),  # the hook
     ),
 )
 

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from sim_tasks.world.props import BOX, MESH
-from sim_tasks.world.tableware import BOTTLE_HEIGHT, BOTTLE_RADIUS, bottle
+from sim_tasks.world.tableware import BOTTLE_RADIUS, bottle
 
 RED_GLASS, WAX = (0.30, 0.05, 0.09, 1.0), (0.80, 0.68, 0.30, 1.0)
 

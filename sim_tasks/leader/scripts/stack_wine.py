@@ -15,7 +15,7 @@ BACK = 0.10  # [m] via point, from the grasp back along the hand
 LIFT, ABOVE = 0.12, 0.10  # [m] after the grasp, and before the bottle is let down
 TURNED = 0.5  # share of the way to the rack that is left where the bottle lies level
 CLOSED = 0.4
-PACE = 0.4  # share of the script's speed, where few turns of the joints move the hand far
+PACE = 0.4  # share of the script's speed where the hand moves far while the joints turn little
 UPSIDE_DOWN = np.diag([-1.0, -1.0, 1.0, 1.0])  # the flange down, with the wrist above it
 
 
@@ -27,26 +27,25 @@ class StackWineLeader(MovesLeader[StackWine]):
     def _moves(self, rng: np.random.Generator) -> Sequence[Move]:
         point, seat = self._world.grasp_point, self._world.seat
         yaw = float(np.arctan2(point[1], point[0])) + ASIDE
-        neck = self._world.rotation(RACK)[:, 0]
         # The hand leans over with the bottle, around the line between its fingers: neck up becomes neck forward.
-        rack_yaw = float(np.arctan2(neck[1], neck[0]))
+        neck = self._world.rotation(RACK)[:, 0]
+        forward = float(np.arctan2(neck[1], neck[0]))
 
         def grasp(offset: np.ndarray) -> np.ndarray:
             return hand_pose(point + offset, PITCH, yaw) @ UPSIDE_DOWN
 
         def place(offset: np.ndarray) -> np.ndarray:
-            return hand_pose(seat + offset, PITCH + np.pi / 2, rack_yaw) @ UPSIDE_DOWN
+            return hand_pose(seat + offset, PITCH + np.pi / 2, forward) @ UPSIDE_DOWN
 
         above = np.array([0.0, 0.0, ABOVE])
         turned = above + TURNED * (point - seat) * (1.0, 1.0, 0.0)
-
         back = -BACK * grasp(np.zeros(3))[:3, 2] + self._draw_via(rng)
         return [
             Move([Keyframe(grasp(back), None)], 1.0),
             Move([Keyframe(grasp(np.zeros(3)), None, straight=True)], 1.0, pace=PACE),
-            Move([Keyframe(grasp(np.array([0.0, 0.0, LIFT])), None, straight=True)], CLOSED),
+            Move([Keyframe(grasp(np.array([0.0, 0.0, LIFT])), None, straight=True)], CLOSED, pace=PACE),
             Move([Keyframe(place(turned), None)], CLOSED),
             Move([Keyframe(place(above), None)], CLOSED, pace=PACE),
-            Move([Keyframe(place(np.array([0.0, 0.0, 0.001])), None, straight=True)], CLOSED),
+            Move([Keyframe(place(np.array([0.0, 0.0, 0.001])), None, straight=True)], CLOSED, pace=PACE),
             Move([], 1.0),
         ]
