@@ -14,7 +14,7 @@ ASIDE = np.radians(50)  # of the hand's direction at the grasp from the robot's:
 BACK = 0.10  # [m] via point, from the grasp back along the hand
 LIFT, ABOVE = 0.12, 0.10  # [m] after the grasp, and before the bottle is let down
 TURNED = 0.5  # share of the way to the rack that is left where the bottle lies level
-CLOSED = 0.4
+CLOSED = 0.0
 PACE = 0.35  # share of the script's speed where the hand moves far while the joints turn little
 UPSIDE_DOWN = np.diag([-1.0, -1.0, 1.0, 1.0])  # the flange down, with the wrist above it
 

@@ -12,7 +12,7 @@ from sim_tasks.tasks.take_umbrella_out_of_stand import STAND, TakeUmbrellaOutOfS
 PITCH = np.radians(40)  # of the hand below the horizontal
 BACK = 0.10  # [m] via point, from the grasp back along the hand
 LIFT = 0.05  # [m] by which the tip ends above the rim
-CLOSED = 0.2
+CLOSED = 0.0
 PACE = 0.8  # share of the script's speed
 
 
