@@ -17,14 +17,14 @@ from sim_tasks.tasks.arm_task import ArmTask
 from sim_tasks.tasks.placement import Placement
 from sim_tasks.world.attachment import Attachment, add_attachments
 from sim_tasks.world.contact import touching
+from sim_tasks.world.grip import slow_grip
 from sim_tasks.world.props import BOX
-from sim_tasks.world.robot import FINGER_KP, GRIPPER, TIP
+from sim_tasks.world.robot import TIP
 from sim_tasks.world.scene import BENCH_CENTRE, BENCH_SIZE
 
 WIDTH = 0.25  # [m] of the reward's kernel over every distance; the paper's, 1 m wide, is flat where learning begins
 TURN_WIDTH = 0.5  # [rad] of that over every angle
 TIMESTEP = 0.004  # [s] of physics
-FINGER_KV = 150.0  # [Ns/m] closes the fingers at 0.2 m/s: told to close at once, undamped ones pass into thin things
 ATTACHED, FRICTION = "attached", "friction"
 GRIPS = (ATTACHED, FRICTION)
 FREE = 0.02  # [m] by which a thing that was taken has left its place
@@ -65,7 +65,7 @@ class ObjectTask(ArmTask):
     def world_spec(self) -> mujoco.MjSpec:
         spec = super().world_spec()
         spec.option.timestep = TIMESTEP
-        spec.actuator(GRIPPER).set_to_position(kp=FINGER_KP, kv=FINGER_KV)
+        slow_grip(spec, self.graspable)
         if self.shoulder_offset > 0:
             (x, y), (length, width), height = BENCH_CENTRE, BENCH_SIZE, self.shoulder_offset
             # Beside the base, which stands on the bench itself.

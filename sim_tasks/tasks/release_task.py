@@ -2,23 +2,12 @@
 
 from abc import abstractmethod
 
-import mujoco
-
 from sim_tasks.tasks.object_task import ObjectTask
 from sim_tasks.world.robot import FINGER_TRAVEL
-
-FIRM = (0.008, 1.0)  # [s] time constant, damping ratio of contacts: fingers sink centimetres into softer, light things
 
 
 class ReleaseTask(ObjectTask):
     """Carry a thing to its place and let go of it."""
-
-    def world_spec(self) -> mujoco.MjSpec:
-        spec = super().world_spec()
-        for name in self.graspable:
-            for geom in spec.body(name).geoms:
-                geom.solref, geom.priority = FIRM, 1  # whatever touches it
-        return spec
 
     @property
     def commanded_opening(self) -> float:
