@@ -41,7 +41,7 @@ class ReachElbowPose(ObjectTask):
     objects = (HAND_GOAL, ELBOW_GOAL)
     arms = ("panda", "panda8")
     centre = (0.475, 0.0)  # x, y [m] of the middle of the hand's goals
-    start = (0.0, -0.3, 0.0, -2.2, 0.0, 1.2, np.pi / 4)  # the elbow on top, the hand pointing forward and down
+    start = (0.0, -0.6, 0.0, -2.05, 0.0, 2.2, np.pi / 4)  # the elbow on top, the hand pointing forward and down
     reward = Reward(hand=0.25, turn=0.25, elbow=0.25, success=0.25)
 
     def __init__(
