@@ -23,7 +23,7 @@ from sim_tasks.world.tableware import bottle
 BOTTLE, FRIDGE, DOOR = "bottle", "fridge", "door"
 OPEN = np.radians(45)  # of the door, from which it stays open
 STILL = 0.025  # [m] by which the bottle may move before
-GRIP = 0.08  # [m] height on the bottle of the hand's start, and of the point that is to come to the mark
+NECK, AHEAD = 0.20, 0.008  # [m] height on the bottle at which the hand starts, distance of its axis before the tip
 MARK = (0.48, 0.00, 0.38)  # [m] outside, beyond the swing of the door
 TAKEN = 0.06  # [m] from the mark
 WIDEST, CLOSE = np.radians(90), 0.005  # [rad] opening from which the door falls onto the arm at the start, to within
@@ -37,14 +37,14 @@ class TakeBottleOutFridge(ObjectTask):
     fridge = Fridge()
     objects = (BOTTLE, DOOR)
     graspable = (BOTTLE,)
-    centre = (0.73, fridge.side)  # x, y [m] of the bottle's mean place
+    centre = (0.77, 0.33)  # x, y [m] of the bottle's mean place
     area = Area.around(
         (fridge.front + fridge.depth / 2, fridge.side), (fridge.depth - 0.08, fridge.inner_width - 0.08)
     )
-    start = (-0.33, 0.74, 0.97, -1.57, -1.53, 2.53, 2.02)  # the hand at the bottle, the elbow out to the right
+    start = (0.06, 0.65, 0.40, -1.46, -0.88, 2.88, 1.50)  # the hand at the bottle, the elbow a little to the right
     reward = Reward(grasp=0.25, door=0.25, out=0.25, success=0.25)
 
-    def __init__(self, *, bottle_range: tuple[float, float] = (0.04, 0.06), **kwargs: Any) -> None:
+    def __init__(self, *, bottle_range: tuple[float, float] = (0.05, 0.04), **kwargs: Any) -> None:
         """Build the task.
 
         Args:
@@ -84,7 +84,7 @@ class TakeBottleOutFridge(ObjectTask):
         """Move the hand to the bottle, the base joint left where it is; leave the arm where that is out of reach."""
         q, arm = self.joint_positions, self.arm
         T_base_hand = kinematics_of(arm).fk(q)
-        T_base_hand[:3, 3] = self._place_of_bottle + (0.0, 0.0, GRIP)
+        T_base_hand[:3, 3] = self._place_of_bottle + (0.0, 0.0, NECK) - AHEAD * T_base_hand[:3, 2]
         held = [q[arm.joints.index(joint)] for joint in arm.redundant]
         ik = kinematics_of(arm).solve(T_base_hand, q, JointAngle(arm, arm.redundant), held)
         if ik.status is Status.OK:
@@ -119,8 +119,8 @@ class TakeBottleOutFridge(ObjectTask):
         return bool(np.linalg.norm(self.position(BOTTLE) - self._place_of_bottle) <= STILL)
 
     def _distance(self) -> float:
-        """Distance [m] of the bottle from the mark."""
-        return float(np.linalg.norm(self.point(BOTTLE, (0.0, 0.0, GRIP)) - self._mark))
+        """Distance [m] of the bottle's neck from the mark."""
+        return float(np.linalg.norm(self.point(BOTTLE, (0.0, 0.0, NECK)) - self._mark))
 
     def _succeeds(self) -> bool:
         return self.grasped and self.opened and self._distance() <= TAKEN

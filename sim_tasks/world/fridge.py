@@ -19,11 +19,11 @@ ENAMEL, LINING, CHROME, SHELF = (
 class Fridge:
     """A fridge whose front faces the robot (-x); the door's hinge is at its left edge (+y), seen from the robot."""
 
-    front: float = 0.60  # x of the opening
-    side: float = 0.32  # y of the middle
-    depth: float = 0.30
-    inner_width: float = 0.36
-    floor: float = 0.26  # z of the compartment's floor
+    front: float = 0.58  # x of the opening
+    side: float = 0.315  # y of the middle
+    depth: float = 0.32
+    inner_width: float = 0.38
+    floor: float = 0.14  # z of the compartment's floor
     ceiling: float = 0.60
     wall: float = 0.02
     door: float = 0.03  # thickness

@@ -5,14 +5,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from er_il.kinematics.solver import kinematics_of
+from sim_tasks.leader.hand import hand_pose
 from sim_tasks.leader.motion import Keyframe
 from sim_tasks.leader.scripts.moves import Move, MovesLeader
 from sim_tasks.tasks.take_bottle_out_fridge import FRIDGE, MARK, TakeBottleOutFridge
 
-PUSHED = 1.10  # [rad] base joint with which the forearm has the door well open
+PUSHED = 1.00  # [rad] base joint with which the forearm has the door well open
 SWING = 12  # keyframes on the way there, all with the hand where it is
-OUT = 0.30  # [rad] base joint with the bottle outside
-BACK, LIFT = 0.13, 0.02  # [m] by which the bottle first moves straight out, and off the floor
+BACK, LIFT = 0.20, 0.02  # [m] by which the bottle then moves straight out, and off the floor
+RETREAT = 0.90  # [rad] base joint there
+OUT, PITCH = 0.60, np.radians(55)  # [rad] base joint at the mark; the hand below the horizontal
+PACE, CARRY = 0.7, 0.55  # shares of the usual speed, until the bottle is out and from then on
 
 
 class TakeBottleOutFridgeLeader(MovesLeader[TakeBottleOutFridge]):
@@ -23,13 +26,13 @@ class TakeBottleOutFridgeLeader(MovesLeader[TakeBottleOutFridge]):
     def _moves(self, rng: np.random.Generator) -> Sequence[Move]:
         world = self._world
         inside = kinematics_of(world.arm).fk(world.joint_positions)
-        lifted, outside = inside.copy(), inside.copy()
+        lifted = inside.copy()
         lifted[:3, 3] += (-BACK, 0.0, LIFT) + self._draw_via(rng)
-        outside[:3, 3] = MARK
-        outside[2, 3] += world.shoulder_offset
+        outside = hand_pose(np.array(MARK) + (0.0, 0.0, world.shoulder_offset), PITCH)
         elbow = world.arm.joints.index(world.arm.redundant[-1])
         swing = np.linspace(world.joint_positions[elbow], PUSHED, SWING + 1)[1:].tolist()
         return [
-            Move([Keyframe(inside, angle) for angle in swing], 0.0),
-            Move([Keyframe(lifted, PUSHED, straight=True), Keyframe(outside, OUT, straight=True)], 0.0),
+            Move([Keyframe(inside, angle) for angle in swing], 0.0, pace=PACE),
+            Move([Keyframe(lifted, RETREAT, straight=True)], 0.0, pace=PACE),
+            Move([Keyframe(outside, OUT, straight=True)], 0.0, pace=CARRY),
         ]
