@@ -98,8 +98,8 @@ class Fridge:
             priority=1,
         )
         seen = {"mass": 0, "contype": 0, "conaffinity": 0, "group": 2}
-        inside = (0.001, half_width - 0.02, half_height - 0.03)
-        body.add_geom(type=BOX, size=inside, pos=(-0.002, y, 0), rgba=LINING, **seen)
+        inside = (0.002, half_width - 0.02, half_height - 0.03)
+        body.add_geom(type=BOX, size=inside, pos=(-0.001, y, 0), rgba=LINING, **seen)
         edge = 0.05 - 2 * half_width  # y of the handle
         grip = (0.008, 0.09, 0)
         body.add_geom(type=CYLINDER, size=grip, pos=(-self.door - 0.03, edge, 0), rgba=CHROME, **seen)

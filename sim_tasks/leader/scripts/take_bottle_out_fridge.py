@@ -15,7 +15,7 @@ SWING = 12  # keyframes on the way there, all with the hand where it is
 BACK, LIFT = 0.20, 0.02  # [m] by which the bottle then moves straight out, and off the floor
 RETREAT = 0.90  # [rad] base joint there
 OUT, PITCH = 0.60, np.radians(55)  # [rad] base joint at the mark; the hand below the horizontal
-PACE, CARRY = 0.7, 0.55  # shares of the usual speed, until the bottle is out and from then on
+PACE, CARRY = 0.7, 0.45  # shares of the usual speed, until the bottle is out and from then on
 
 
 class TakeBottleOutFridgeLeader(MovesLeader[TakeBottleOutFridge]):
