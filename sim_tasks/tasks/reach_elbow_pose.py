@@ -4,6 +4,7 @@ The hand's pose leaves the elbow a circle; the green ball says where on it the e
 postures of the arm, so that hand and elbow can always be there at once.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import mujoco
@@ -26,8 +27,11 @@ TURNED = 0.09  # [rad] of the rotation vector's three numbers in the mean, which
 HEIGHTS = (0.20, 0.50)  # [m] of the hand's goal above the bench
 SIDEWAYS = np.pi * np.array([0.30, 0.45])  # [rad] the elbow's turn from the top of its circle, to either side
 DOWN = Rotation.from_euler("x", np.pi)  # the hand points down, its fingers beside each other
-SIDE = (1.45, -1.1, -1.2, -2.2, -0.9, 1.6, 1.5)  # [rad] a posture with the elbow out to the right, the hand down
-MIRROR = np.array([-1, 1, -1, 1, -1, 1, -1])  # to the left; the last joint's zero is a quarter turn off
+SIDE = np.array(
+    [1.45, -1.1, -1.2, -2.2, -0.9, 1.6, 1.5]
+)  # [rad] a posture with the elbow out to the right, the hand down
+MIRROR = np.array([-1, 1, -1, 1, -1, 1, -1])  # turns it to the left, the last joint about STRAIGHT
+STRAIGHT = np.array([0, 0, 0, 0, 0, 0, np.pi / 4])  # [rad] with which the hand is square to the forearm
 SPREAD = 0.4  # [rad] of the postures from which goals are sought
 MARGIN = 0.1  # [rad] between a goal's posture and the joints' limits
 RED, GREEN = (0.85, 0.10, 0.10, 1.0), (0.15, 0.65, 0.20, 0.6)
@@ -57,7 +61,7 @@ class ReachElbowPose(ObjectTask):
         self._hand_range = sides("hand_range", hand_range)
         self._turn_range = span("turn_range", turn_range)
         self._heights = {HAND_GOAL: 0.0, ELBOW_GOAL: 0.0}  # [m] in this episode
-        self._tilt = np.zeros(2)  # [rad] of the hand's goal in this episode, about x and y
+        self._tilt: Sequence[float] = (0.0, 0.0)  # [rad] of the hand's goal in this episode, about x and y
         super().__init__(**kwargs)
         self.posture = self.nominal_start  # (n,) [rad] one that meets both of the goals drawn
         self._elbow = self.model.body(ELBOW).id
@@ -77,14 +81,15 @@ class ReachElbowPose(ObjectTask):
     def _draw(self, rng: np.random.Generator) -> Placement:
         while True:
             x, y = np.array(self.centre) + (rng.random(2) - 0.5) * self._hand_range
-            height, (*tilt, yaw) = rng.uniform(*HEIGHTS), rng.uniform(-self._turn_range, self._turn_range, 3)
+            height = rng.uniform(*HEIGHTS)
+            *tilt, yaw = rng.uniform(-self._turn_range, self._turn_range, 3).tolist()
             T_base_hand = np.eye(4)
             T_base_hand[:3, :3] = _turned(tilt, yaw).as_matrix()
             T_base_hand[:3, 3] = (x, y, height + self.shoulder_offset)
             posture = self._posture(T_base_hand, rng)
             if posture is not None:
                 break
-        self.posture, self._tilt = posture, np.array(tilt)
+        self.posture, self._tilt = posture, tilt
         elbow = kinematics_of(self.arm).frame_pose(posture, ELBOW)[:3, 3]
         self._heights = {HAND_GOAL: height, ELBOW_GOAL: float(elbow[2]) - self.shoulder_offset}
         return {HAND_GOAL: (x, y, yaw), ELBOW_GOAL: (float(elbow[0]), float(elbow[1]), 0.0)}
@@ -93,9 +98,7 @@ class ReachElbowPose(ObjectTask):
         """A posture (n,) [rad] with the elbow at a random side; None if the one drawn does not suit."""
         arm, kinematics = self.arm, kinematics_of(self.arm)
         seed = self.nominal_start
-        quarter = np.array([0, 0, 0, 0, 0, 0, np.pi / 4])
-        side = (np.array(SIDE) - quarter) * (MIRROR if rng.random() < 0.5 else 1) + quarter
-        seed[-len(side) :] = side
+        seed[-len(SIDE) :] = STRAIGHT + (SIDE - STRAIGHT) * (MIRROR if rng.random() < 0.5 else 1)
         ik = kinematics.solve(T_base_hand, seed + rng.uniform(-SPREAD, SPREAD, arm.dof))
         q = ik.q.round(9)  # its last bits differ from process to process
         if ik.status is not Status.OK or np.any((q < arm.lower + MARGIN) | (q > arm.upper - MARGIN)):
@@ -135,6 +138,6 @@ class ReachElbowPose(ObjectTask):
         }
 
 
-def _turned(tilt: np.ndarray, yaw: float) -> Rotation:
+def _turned(tilt: Sequence[float], yaw: float) -> Rotation:
     """Orientation of a hand that points down but for a tilt [rad] about x and y, then a yaw [rad]."""
     return Rotation.from_euler("xyz", [*tilt, yaw]) * DOWN

@@ -38,9 +38,7 @@ class TakeBottleOutFridge(ObjectTask):
     objects = (BOTTLE, DOOR)
     graspable = (BOTTLE,)
     centre = (0.77, 0.33)  # x, y [m] of the bottle's mean place
-    area = Area.around(
-        (fridge.front + fridge.depth / 2, fridge.side), (fridge.depth - 0.08, fridge.inner_width - 0.08)
-    )
+    area = Area.around((fridge.front + fridge.depth / 2, fridge.side), (fridge.depth - 0.08, fridge.inner_width - 0.08))
     start = (0.06, 0.65, 0.40, -1.46, -0.88, 2.88, 1.50)  # the hand at the bottle, the elbow a little to the right
     reward = Reward(grasp=0.25, door=0.25, out=0.25, success=0.25)
 
@@ -56,12 +54,12 @@ class TakeBottleOutFridge(ObjectTask):
         self._hinge = self.model.joint(DOOR)
         self._spring = float(self._hinge.stiffness[0])
         self._door = {self.model.body(DOOR).id}
-        self._mark = np.array(MARK) + (0.0, 0.0, self.shoulder_offset)
+        self.mark = np.array(MARK)  # [m] to which the bottle's neck is to come
         self._place_of_bottle = np.zeros(3)  # [m] in this episode
         self.opened = False  # the catch holds the door open
 
     def _build(self, spec: mujoco.MjSpec) -> None:
-        self.fridge.raised(self.shoulder_offset).add(spec, FRIDGE, DOOR)
+        self.fridge.add(spec, FRIDGE, DOOR)
         bottle().add(spec, BOTTLE, (*self.centre, self.fridge.floor))
         spec.worldbody.add_geom(
             type=SPHERE, size=(TAKEN, 0, 0), pos=MARK, rgba=(0.15, 0.65, 0.2, 0.25), contype=0, conaffinity=0, group=2
@@ -84,7 +82,7 @@ class TakeBottleOutFridge(ObjectTask):
         """Move the hand to the bottle, the base joint left where it is; leave the arm where that is out of reach."""
         q, arm = self.joint_positions, self.arm
         T_base_hand = kinematics_of(arm).fk(q)
-        T_base_hand[:3, 3] = self._place_of_bottle + (0.0, 0.0, NECK) - AHEAD * T_base_hand[:3, 2]
+        T_base_hand[:3, 3] = self._place_of_bottle + np.array([0.0, 0.0, NECK]) - AHEAD * T_base_hand[:3, 2]
         held = [q[arm.joints.index(joint)] for joint in arm.redundant]
         ik = kinematics_of(arm).solve(T_base_hand, q, JointAngle(arm, arm.redundant), held)
         if ik.status is Status.OK:
@@ -120,7 +118,7 @@ class TakeBottleOutFridge(ObjectTask):
 
     def _distance(self) -> float:
         """Distance [m] of the bottle's neck from the mark."""
-        return float(np.linalg.norm(self.point(BOTTLE, (0.0, 0.0, NECK)) - self._mark))
+        return float(np.linalg.norm(self.point(BOTTLE, (0.0, 0.0, NECK)) - self.mark))
 
     def _succeeds(self) -> bool:
         return self.grasped and self.opened and self._distance() <= TAKEN

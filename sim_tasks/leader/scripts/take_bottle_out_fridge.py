@@ -8,13 +8,14 @@ from er_il.kinematics.solver import kinematics_of
 from sim_tasks.leader.hand import hand_pose
 from sim_tasks.leader.motion import Keyframe
 from sim_tasks.leader.scripts.moves import Move, MovesLeader
-from sim_tasks.tasks.take_bottle_out_fridge import FRIDGE, MARK, TakeBottleOutFridge
+from sim_tasks.tasks.take_bottle_out_fridge import FRIDGE, TakeBottleOutFridge
 
 PUSHED = 1.00  # [rad] base joint with which the forearm has the door well open
 SWING = 12  # keyframes on the way there, all with the hand where it is
 BACK, LIFT = 0.20, 0.02  # [m] by which the bottle then moves straight out, and off the floor
 RETREAT = 0.90  # [rad] base joint there
 OUT, PITCH = 0.60, np.radians(55)  # [rad] base joint at the mark; the hand below the horizontal
+WAIT = 0.2  # [s] before the fingers close
 PACE, CARRY = 0.7, 0.45  # shares of the usual speed, until the bottle is out and from then on
 
 
@@ -27,11 +28,12 @@ class TakeBottleOutFridgeLeader(MovesLeader[TakeBottleOutFridge]):
         world = self._world
         inside = kinematics_of(world.arm).fk(world.joint_positions)
         lifted = inside.copy()
-        lifted[:3, 3] += (-BACK, 0.0, LIFT) + self._draw_via(rng)
-        outside = hand_pose(np.array(MARK) + (0.0, 0.0, world.shoulder_offset), PITCH)
+        lifted[:3, 3] += np.array([-BACK, 0.0, LIFT]) + self._draw_via(rng)
+        outside = hand_pose(world.mark, PITCH)
         elbow = world.arm.joints.index(world.arm.redundant[-1])
-        swing = np.linspace(world.joint_positions[elbow], PUSHED, SWING + 1)[1:].tolist()
+        at_rest, *swing = np.linspace(world.joint_positions[elbow], PUSHED, SWING + 1).tolist()
         return [
+            Move([Keyframe(inside, at_rest)], 1.0, hold=WAIT),
             Move([Keyframe(inside, angle) for angle in swing], 0.0, pace=PACE),
             Move([Keyframe(lifted, RETREAT, straight=True)], 0.0, pace=PACE),
             Move([Keyframe(outside, OUT, straight=True)], 0.0, pace=CARRY),
