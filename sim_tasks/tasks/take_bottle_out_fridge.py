@@ -23,7 +23,7 @@ from sim_tasks.world.tableware import bottle
 BOTTLE, FRIDGE, DOOR = "bottle", "fridge", "door"
 OPEN = np.radians(45)  # of the door, from which it stays open
 STILL = 0.025  # [m] by which the bottle may move before
-NECK, AHEAD = 0.20, 0.008  # [m] height on the bottle at which the hand starts, distance of its axis before the tip
+NECK, AHEAD = 0.20, 0.012  # [m] height on the bottle at which the hand starts, distance of its axis before the tip
 MARK = (0.48, 0.00, 0.38)  # [m] outside, beyond the swing of the door
 TAKEN = 0.06  # [m] from the mark
 WIDEST, CLOSE = np.radians(90), 0.005  # [rad] opening from which the door falls onto the arm at the start, to within

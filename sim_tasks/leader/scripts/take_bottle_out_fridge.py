@@ -15,8 +15,8 @@ SWING = 12  # keyframes on the way there, all with the hand where it is
 BACK, LIFT = 0.20, 0.02  # [m] by which the bottle then moves straight out, and off the floor
 RETREAT = 0.90  # [rad] base joint there
 OUT, PITCH = 0.60, np.radians(55)  # [rad] base joint at the mark; the hand below the horizontal
-WAIT = 0.2  # [s] before the fingers close
-PACE, CARRY = 0.7, 0.45  # shares of the usual speed, until the bottle is out and from then on
+FORWARD, WAIT = 0.006, 0.2  # [m] by which the hand first moves along its axis, [s] before the fingers close
+PACE, CARRY = 0.85, 0.55  # shares of the usual speed, until the bottle is out and from then on
 
 
 class TakeBottleOutFridgeLeader(MovesLeader[TakeBottleOutFridge]):
@@ -27,13 +27,14 @@ class TakeBottleOutFridgeLeader(MovesLeader[TakeBottleOutFridge]):
     def _moves(self, rng: np.random.Generator) -> Sequence[Move]:
         world = self._world
         inside = kinematics_of(world.arm).fk(world.joint_positions)
+        inside[:3, 3] += FORWARD * inside[:3, 2]
         lifted = inside.copy()
         lifted[:3, 3] += np.array([-BACK, 0.0, LIFT]) + self._draw_via(rng)
         outside = hand_pose(world.mark, PITCH)
         elbow = world.arm.joints.index(world.arm.redundant[-1])
         at_rest, *swing = np.linspace(world.joint_positions[elbow], PUSHED, SWING + 1).tolist()
         return [
-            Move([Keyframe(inside, at_rest)], 1.0, hold=WAIT),
+            Move([Keyframe(inside, at_rest)], 1.0, pace=PACE, hold=WAIT),
             Move([Keyframe(inside, angle) for angle in swing], 0.0, pace=PACE),
             Move([Keyframe(lifted, RETREAT, straight=True)], 0.0, pace=PACE),
             Move([Keyframe(outside, OUT, straight=True)], 0.0, pace=CARRY),
