@@ -16,7 +16,7 @@ BACK, LIFT = 0.20, 0.02  # [m] by which the bottle then moves straight out, and 
 RETREAT = 0.90  # [rad] base joint there
 OUT, PITCH = 0.60, np.radians(55)  # [rad] base joint at the mark; the hand below the horizontal
 FORWARD, WAIT = 0.006, 0.2  # [m] by which the hand first moves along its axis, [s] before the fingers close
-PACE, CARRY = 0.85, 0.55  # shares of the usual speed, until the bottle is out and from then on
+PACE, CARRY = 0.85, 0.45  # shares of the usual speed, until the bottle is out and from then on
 
 
 class TakeBottleOutFridgeLeader(MovesLeader[TakeBottleOutFridge]):
