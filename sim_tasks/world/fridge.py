@@ -23,9 +23,9 @@ class Fridge:
     wall: float = 0.02
     door: float = 0.03  # thickness
     opening: float = 1.9  # [rad] of the door at its stop
-    stiffness: float = 1.5  # [Nm/rad] of the spring that closes it
+    stiffness: float = 3.0  # [Nm/rad] of the spring that closes it
     preload: float = 0.3  # [rad] by which the spring is wound up when the door is shut
-    damping: float = 0.4  # [Nms/rad]
+    damping: float = 3.0  # [Nms/rad] it cannot be flung open
     mass: float = 1.2  # [kg] of the door
 
     @property
