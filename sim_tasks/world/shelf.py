@@ -42,7 +42,7 @@ class BarShelf:
             size=(self.board / 2, self.width / 2, t),
             pos=(0.0, 0.0, self.height - t),
             material=material,
-            friction=(0.3, 0.005, 0.0001),
+            friction=(0.3, 0.03, 0.0001),
             priority=1,
         )
         for side in (-1, 1):
