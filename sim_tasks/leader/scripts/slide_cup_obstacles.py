@@ -10,7 +10,7 @@ from sim_tasks.leader.scripts.moves import Move, MovesLeader
 from sim_tasks.tasks.slide_cup_obstacles import COUNTER, MARK, SlideCupObstacles
 
 PITCH = np.radians(50)  # of the hand below the horizontal
-ASIDE, ABOVE = 0.02, 0.04  # [m] of the via point, from where the hand pushes
+ASIDE, ABOVE = 0.03, 0.04  # [m] of the via point, from where the hand pushes
 ELBOW, ELBOW_TURN = -0.13, 10.5  # [rad] of the base joint with the hand at y = 0, [rad/m] of its change along the shelf
 NEARER = 0.008  # [m] that the tip is nearer to the robot than the cup's middle: there the cup does not turn out of its way
 PUSH_STEP = 0.03  # [m] between the keyframes of the push
