@@ -40,7 +40,7 @@ class SlideCupObstacles(ObjectTask):
     objects = (CUP, MARK)
     bottles = tuple(f"bottle{i}" for i in range(len(PLACES)))
     area = Area((furniture.back, furniture.back + furniture.board), (-furniture.width / 2, furniture.width / 2))
-    start = (-1.3, -0.54, 0.77, -2.01, 0.83, 2.15, 0.02)  # the hand behind the row, the elbow to the right
+    start = (-1.3, -0.54, 0.77, -2.01, 0.83, 2.15, 0.02)  # the hand behind the row, the elbow to the left
     centre = (0.61, -0.06)  # x, y [m] of the middle of the cup's places
     distance = 0.17  # [m] between cup and mark on average
     reward = Reward(reach=0.4, slide=0.4, success=0.2)

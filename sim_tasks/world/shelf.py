@@ -15,7 +15,7 @@ class BarShelf:
     depth: float = 0.11  # of the counter
     back: float = 0.51  # x of the shelf's front edge
     board: float = 0.20  # depth of the shelf
-    width: float = 0.74
+    width: float = 0.90
     height: float = 0.42  # z of both tops
 
     def add(self, spec: mujoco.MjSpec, counter: str, shelf: str, material: str, inner: str) -> None:
