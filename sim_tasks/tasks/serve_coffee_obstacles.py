@@ -49,9 +49,9 @@ class ServeCoffeeObstacles(ObjectTask):
     def __init__(
         self,
         *,
-        mug_range: tuple[float, float] = (0.04, 0.03),
-        mug_yaw_range: float = np.radians(25),
-        plate_range: tuple[float, float] = (0.03, 0.03),
+        mug_range: tuple[float, float] = (0.06, 0.04),
+        mug_yaw_range: float = 0.44,
+        plate_range: tuple[float, float] = (0.06, 0.03),
         **kwargs: Any,
     ) -> None:
         """Build the task.
@@ -96,7 +96,7 @@ class ServeCoffeeObstacles(ObjectTask):
 
     def _to_plate(self) -> Vector:
         """From the mug to where it stands on the plate (3,) [m]."""
-        return self.position(PLATE) + (0.0, 0.0, self.plate.height) - self.position(MUG)
+        return self.point(PLATE, (0.0, 0.0, self.plate.height)) - self.position(MUG)
 
     def _succeeds(self) -> bool:
         x, y, z = self._to_plate()

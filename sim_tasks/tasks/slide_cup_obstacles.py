@@ -13,19 +13,20 @@ from er_il.arms.arm import Vector
 from sim_tasks.tasks.object_task import UPRIGHT, WIDTH, ObjectTask
 from sim_tasks.tasks.placement import Area, Placement
 from sim_tasks.tasks.rewards import Reward, proximity
+from sim_tasks.world.crockery import teacup
 from sim_tasks.world.fixed import add_fixed
 from sim_tasks.world.props import CYLINDER
 from sim_tasks.world.randomisation import sides, span
 from sim_tasks.world.shelf import BarShelf
-from sim_tasks.world.tableware import bottle, cup
+from sim_tasks.world.tableware import bottle
 
 CUP, MARK = "cup", "mark"
 COUNTER, SHELF = "counter", "shelf"
 ROW = 0.29  # x [m] of the bottles
 PLACES = (-0.19, -0.08, 0.18, 0.29, 0.40)  # y [m] of the bottles, by 11 cm but for the gap
-BESIDE = 0.05  # [m] beside the cup's middle, where the tip of a closed hand touches the cup's side
+BESIDE = 0.058  # [m] beside the cup's middle, where the tip of a closed hand touches the cup's side
 TOUCH = 0.025  # [m] from there, within which the tip counts as there
-HEIGHT = 0.08  # [m] above the shelf at which the hand pushes: its palm passes over the cup
+HEIGHT = 0.055  # [m] above the shelf at which the hand pushes, its palm above the cup
 PLACED = 0.03  # [m] between the cup and the mark, at most
 STANDS = np.cos(np.radians(15))  # of the tilt of a cup that stands
 FALL = 0.075  # [m] by which the cup falls at a failure
@@ -46,7 +47,7 @@ class SlideCupObstacles(ObjectTask):
     reward = Reward(reach=0.4, slide=0.4, success=0.2)
 
     def __init__(
-        self, *, cup_range: tuple[float, float] = (0.03, 0.04), distance_range: float = 0.02, **kwargs: Any
+        self, *, cup_range: tuple[float, float] = (0.04, 0.04), distance_range: float = 0.02, **kwargs: Any
     ) -> None:
         """Build the task.
 
@@ -67,7 +68,7 @@ class SlideCupObstacles(ObjectTask):
             add_fixed(spec, bottle(), name, (ROW, y, furniture.height))
         mark = spec.worldbody.add_body(name=MARK, mocap=True)
         mark.add_geom(type=CYLINDER, size=(0.045, 0.001, 0), material="red", contype=0, conaffinity=0, group=2)
-        cup().add(spec, CUP, (*self.centre, furniture.height))
+        teacup().add(spec, CUP, (*self.centre, furniture.height))
 
     def _draw(self, rng: np.random.Generator) -> Placement:
         x, y = np.array(self.centre) + (rng.random(2) - 0.5) * self._cup_range

@@ -1,4 +1,4 @@
-"""A mug with a handle and a plate; see :mod:`sim_tasks.world.household` for the mug's frame."""
+"""A mug, a teacup and a plate; see :mod:`sim_tasks.world.household` for frames."""
 
 from dataclasses import dataclass
 
@@ -6,26 +6,38 @@ import mujoco
 
 from sim_tasks.world.household import CREAM, CYLINDER, Primitive, Rgba, Thing
 from sim_tasks.world.props import CAPSULE
-from sim_tasks.world.tableware import COFFEE
+from sim_tasks.world.tableware import COFFEE, CUP_BLUE
 
 MUG_RADIUS, MUG_HEIGHT = 0.032, 0.090  # [m] narrow enough for the fingers
+TEACUP_RADIUS, TEACUP_HEIGHT = 0.042, 0.068  # [m] wide and low: it slides where a taller cup would tip
 MUG_RED: Rgba = (0.80, 0.22, 0.16, 1.0)
 
 
 def mug(colour: Rgba = MUG_RED) -> Thing:
     """A mug of coffee, its handle along +x; the handle is only seen."""
-    half, out = MUG_HEIGHT / 2, MUG_RADIUS + 0.024
-    bar = 0.005  # [m] radius of the handle
+    return _cup(MUG_RADIUS, MUG_HEIGHT, 0.25, colour)
+
+
+def teacup(colour: Rgba = CUP_BLUE) -> Thing:
+    """A wide cup of coffee, its handle along +x; the handle is only seen."""
+    return _cup(TEACUP_RADIUS, TEACUP_HEIGHT, 0.2, colour)
+
+
+def _cup(radius: float, height: float, mass: float, colour: Rgba) -> Thing:
+    half, loop, bar = height / 2, 0.4 * height / 2, 0.005  # [m] half heights of cup and handle, radius of the handle
+    outer = radius + 0.024
     return Thing(
-        mass=0.25,
+        mass=mass,
         looks=(
-            Primitive(CYLINDER, (MUG_RADIUS, half, 0.0), (0.0, 0.0, half), colour),
-            Primitive(CYLINDER, (MUG_RADIUS - 0.004, 0.001, 0.0), (0.0, 0.0, MUG_HEIGHT), COFFEE),
-            Primitive(CAPSULE, (bar, 0.018, 0.0), (out, 0.0, half), colour),
-            Primitive(CAPSULE, (bar, 0.012, 0.0), (MUG_RADIUS + 0.012, 0.0, half + 0.018), colour, (0.0, 90.0, 0.0)),
-            Primitive(CAPSULE, (bar, 0.012, 0.0), (MUG_RADIUS + 0.012, 0.0, half - 0.018), colour, (0.0, 90.0, 0.0)),
+            Primitive(CYLINDER, (radius, half, 0.0), (0.0, 0.0, half), colour),
+            Primitive(CYLINDER, (radius - 0.004, 0.001, 0.0), (0.0, 0.0, height), COFFEE),
+            Primitive(CAPSULE, (bar, loop, 0.0), (outer, 0.0, half), colour),
+            *(
+                Primitive(CAPSULE, (bar, 0.012, 0.0), (radius + 0.012, 0.0, z), colour, (0.0, 90.0, 0.0))
+                for z in (half - loop, half + loop)
+            ),
         ),
-        touch=((Primitive(CYLINDER, (MUG_RADIUS, half, 0.0), (0.0, 0.0, half)), 1.0),),
+        touch=((Primitive(CYLINDER, (radius, half, 0.0), (0.0, 0.0, half)), 1.0),),
     )
 
 

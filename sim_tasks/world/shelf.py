@@ -15,7 +15,7 @@ class BarShelf:
     depth: float = 0.11  # of the counter
     back: float = 0.51  # x of the shelf's front edge
     board: float = 0.20  # depth of the shelf
-    width: float = 0.90
+    width: float = 0.90  # of both
     height: float = 0.42  # z of both tops
 
     def add(self, spec: mujoco.MjSpec, counter: str, shelf: str, material: str, inner: str) -> None:
@@ -35,7 +35,8 @@ class BarShelf:
                 **seen,
             )
         body = spec.worldbody.add_body(name=shelf, pos=(self.back + self.board / 2, 0.0, 0.0))
-        # Smooth (by its priority, whatever stands on it): a cup that is pushed at half its height slides.
+        # Smooth (by its priority, whatever stands on it), so that a pushed cup slides and does not tip, but it resists
+        # turning, so that the cup does not roll along the hand.
         body.add_geom(
             name=f"{shelf}_board",
             type=BOX,

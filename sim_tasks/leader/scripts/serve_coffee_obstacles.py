@@ -7,7 +7,15 @@ import numpy as np
 from sim_tasks.leader.hand import hand_pose
 from sim_tasks.leader.motion import Keyframe
 from sim_tasks.leader.scripts.moves import Move, MovesLeader
-from sim_tasks.tasks.serve_coffee_obstacles import BOTTLES, COUNTER, GRASP, PLANTS, PLATE, WAYPOINT, ServeCoffeeObstacles
+from sim_tasks.tasks.serve_coffee_obstacles import (
+    BOTTLES,
+    COUNTER,
+    GRASP,
+    PLANTS,
+    PLATE,
+    WAYPOINT,
+    ServeCoffeeObstacles,
+)
 
 PITCH = np.radians(65)  # of the hand below the horizontal
 ABOVE = 0.08  # [m] of the via point, from the grasp
@@ -26,12 +34,13 @@ class ServeCoffeeObstaclesLeader(MovesLeader[ServeCoffeeObstacles]):
     def _moves(self, rng: np.random.Generator) -> Sequence[Move]:
         world = self._world
         grasp = world.grasp_point
-        placed = world.position(PLATE) + [0.0, 0.0, world.plate.height + DROP] + GRASP
+        above = grasp + np.array([0.0, 0.0, ABOVE])
+        placed = world.position(PLATE) + np.array([0.0, 0.0, world.plate.height + DROP + GRASP[2]])
         carried = WAYPOINT[2] + world.shoulder_offset + GRASP[2]  # z [m] of the hand on the way across
         across = np.linspace(grasp[0], placed[0], 2 + len(SIDES))[1:-1]
-        fetch = [_keyframe(grasp + [0.0, 0.0, ABOVE] + self._draw_via(rng)), _keyframe(grasp, straight=True)]
+        fetch = [_keyframe(above + self._draw_via(rng)), _keyframe(grasp, straight=True)]
         carry = [(grasp[0], grasp[1], carried), *((x, y, carried) for x, y in zip(across, SIDES, strict=True))]
-        carry += [(placed[0], placed[1], carried), placed]
+        carry += [(placed[0], placed[1], carried), tuple(placed)]
         return [
             Move(fetch, OPEN),
             Move([_keyframe(np.array(point), straight=True) for point in carry], CLOSED),
