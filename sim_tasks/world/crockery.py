@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import mujoco
 
 from sim_tasks.world.household import CREAM, CYLINDER, Primitive, Rgba, Thing
-from sim_tasks.world.props import CAPSULE
+from sim_tasks.world.props import BOX, CAPSULE
 from sim_tasks.world.tableware import COFFEE, CUP_BLUE
 
 MUG_RADIUS, MUG_HEIGHT = 0.032, 0.090  # [m] narrow enough for the fingers
@@ -24,18 +24,14 @@ def teacup(colour: Rgba = CUP_BLUE) -> Thing:
 
 
 def _cup(radius: float, height: float, mass: float, colour: Rgba) -> Thing:
-    half, loop, bar = height / 2, 0.4 * height / 2, 0.005  # [m] half heights of cup and handle, radius of the handle
-    outer = radius + 0.024
+    half, loop, bar = height / 2, 0.4 * height / 2, 0.005  # [m] half heights of cup and handle, the handle's thickness
     return Thing(
         mass=mass,
         looks=(
             Primitive(CYLINDER, (radius, half, 0.0), (0.0, 0.0, half), colour),
             Primitive(CYLINDER, (radius - 0.004, 0.001, 0.0), (0.0, 0.0, height), COFFEE),
-            Primitive(CAPSULE, (bar, loop, 0.0), (outer, 0.0, half), colour),
-            *(
-                Primitive(CAPSULE, (bar, 0.012, 0.0), (radius + 0.012, 0.0, z), colour, (0.0, 90.0, 0.0))
-                for z in (half - loop, half + loop)
-            ),
+            Primitive(CAPSULE, (bar, loop, 0.0), (radius + 0.024, 0.0, half), colour),
+            *(Primitive(BOX, (0.014, bar, bar), (radius + 0.010, 0.0, z), colour) for z in (half - loop, half + loop)),
         ),
         touch=((Primitive(CYLINDER, (radius, half, 0.0), (0.0, 0.0, half)), 1.0),),
     )
