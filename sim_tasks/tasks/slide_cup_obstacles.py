@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from er_il.arms.arm import Vector
-from sim_tasks.tasks.object_task import UPRIGHT, WIDTH, ObjectTask
+from sim_tasks.tasks.object_task import WIDTH, ObjectTask
 from sim_tasks.tasks.placement import Area, Placement
 from sim_tasks.tasks.rewards import Reward, proximity
 from sim_tasks.world.crockery import teacup
@@ -33,7 +33,7 @@ FALL = 0.075  # [m] by which the cup falls at a failure
 
 
 class SlideCupObstacles(ObjectTask):
-    """The cup on the mark, pushed from its right, the elbow crossing behind the bottles."""
+    """The cup on the mark, pushed from its right, the elbow swinging from left to right."""
 
     task = "slide_cup_obstacles"
     task_description = "Slide the cup along the shelf to the red mark."
@@ -77,7 +77,7 @@ class SlideCupObstacles(ObjectTask):
 
     def _arrange(self, placement: Placement) -> None:
         for name, (x, y, _) in placement.items():
-            self._put(name, (x, y, self.furniture.height + 0.0005), UPRIGHT)
+            self._put(name, (x, y, self.furniture.height + 0.0005))
 
     @property
     def push_point(self) -> Vector:
