@@ -1,0 +1,17 @@
+"""Things that stand fast: what the arm has to keep clear of and cannot push away."""
+
+from collections.abc import Sequence
+
+import mujoco
+
+from sim_tasks.world.household import Thing
+
+
+def add_fixed(
+    spec: mujoco.MjSpec, thing: Thing, name: str, position: Sequence[float] = (0.0, 0.0, 0.0), *, movable: bool = False
+) -> mujoco.MjsBody:
+    """Add a thing without its free joint, at a position [m]; ``movable``: as a mocap body, put anywhere by a task."""
+    body = thing.add(spec, name, position)
+    spec.delete(spec.joint(name))
+    body.mocap = movable
+    return body
