@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from sim_tasks.world.props import BOX, CAPSULE, CYLINDER
 
@@ -55,8 +56,9 @@ class Thing:
 
 
 def _geom(body: mujoco.MjsBody, primitive: Primitive, **kwargs: object) -> None:
-    geom = body.add_geom(type=primitive.kind, size=primitive.size, pos=primitive.centre, rgba=primitive.rgba, **kwargs)
-    geom.alt.euler = primitive.turn
+    x, y, z, w = Rotation.from_euler("XYZ", primitive.turn, degrees=True).as_quat()
+    look = {"size": primitive.size, "pos": primitive.centre, "quat": (w, x, y, z), "rgba": primitive.rgba}
+    body.add_geom(type=primitive.kind, **look, **kwargs)
 
 
 def _pair(
