@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from er_il.arms.arm import Vector
-from sim_tasks.tasks.object_task import WIDTH, ObjectTask, yawed
+from sim_tasks.tasks.object_task import UPRIGHT, WIDTH, ObjectTask, yawed
 from sim_tasks.tasks.placement import Placement
 from sim_tasks.tasks.rewards import Reward, proximity
 from sim_tasks.world.grill import Grill, add_order
@@ -87,7 +87,7 @@ class MeatOffGrill(ObjectTask):
                 turn + rng.uniform(-self._meat_yaw_range, self._meat_yaw_range),
             )
         self.asked = str(rng.choice(MEATS))
-        return placement | {ORDER: (*placement[self.asked][:2], turn)}
+        return placement | {ORDER: (*placement[self.asked][:2], 0.0)}
 
     def _arrange(self, placement: Placement) -> None:
         heights = {GRILL: 0.0} | dict.fromkeys(MEATS, self.grill.grate)
@@ -95,8 +95,7 @@ class MeatOffGrill(ObjectTask):
             x, y, yaw = placement[name]
             self._put(name, (x, y, height), yawed(yaw))
         x, y, _ = placement[ORDER]
-        turn = yawed(0.0) if self.asked == MEATS[0] else FLIPPED
-        self._put(ORDER, (x, y, self.grill.grate + CLEAR), turn)
+        self._put(ORDER, (x, y, self.grill.grate + CLEAR), UPRIGHT if self.asked == MEATS[0] else FLIPPED)
 
     def _distance(self) -> float:
         """Distance [m] from the asked piece to the shelf; 0 if it is in place."""
