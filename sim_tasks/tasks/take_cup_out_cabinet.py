@@ -16,10 +16,7 @@ from sim_tasks.world.tableware import CUP_HEIGHT, cup
 CUP, CABINET, GOAL = "cup", "cabinet", "goal"
 MIDDLE = (0.0, 0.0, CUP_HEIGHT / 2)  # [m] of the cup, in its frame
 REACHED = 0.05  # [m] from the goal to the middle of a cup that is there
-DISTANCE = 0.66  # [m] from the base to the cabinet's middle
-# The direction [rad] in which the cabinet stands, as a share of its turn. In one place for all turns, no elbow
-# lets the forearm pass the cabinet's edge when that is turned by a right angle.
-BEARING = 0.2
+PLACE = (0.62, 0.0)  # x, y [m] of the cabinet's middle
 OUTSIDE = 0.12  # [m] from the opening to the goal
 GOAL_HEIGHT = 0.10  # [m] mean, above the compartment's floor
 
@@ -33,7 +30,7 @@ class TakeCupOutCabinet(ObjectTask):
     graspable = (CUP,)
     arms = ("panda", "panda8")
     cabinet = Cupboard()
-    start = (0.0, -1.094, 0.0, -2.575, 0.0, 2.354, np.pi / 4)  # the hand forward, before the cabinet
+    start = (0.0, -1.357, 0.0, -2.584, 0.0, 2.099, np.pi / 4)  # the hand forward, well before the cabinet
     reward = Reward(reach=0.4, take=0.4, success=0.2)
 
     def __init__(
@@ -47,7 +44,7 @@ class TakeCupOutCabinet(ObjectTask):
         """Build the task.
 
         Args:
-            cabinet_yaw_range: The cabinet is turned up to this far [rad]; it stands on an arc around the robot.
+            cabinet_yaw_range: The cabinet is turned up to this far [rad].
             cup_range: Sides [m] of the rectangle on the compartment's floor in which the cup stands: depth, width.
             goal_range: Sides [m] of the upright rectangle before the opening in which the goal is: width, height.
             kwargs: See :class:`ObjectTask`.
@@ -70,15 +67,14 @@ class TakeCupOutCabinet(ObjectTask):
 
     def _draw(self, rng: np.random.Generator) -> Placement:
         turn = rng.uniform(-self._cabinet_yaw_range, self._cabinet_yaw_range)
-        place = DISTANCE * np.array([np.cos(BEARING * turn), np.sin(BEARING * turn)])
         axes = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
-        x, y = place + axes @ ((rng.random(2) - 0.5) * self._cup_range)
+        x, y = PLACE + axes @ ((rng.random(2) - 0.5) * self._cup_range)
         aside, up = (rng.random(2) - 0.5) * self._goal_range
-        goal_x, goal_y = place + axes @ (-self.cabinet.depth / 2 - OUTSIDE, aside)
+        goal_x, goal_y = PLACE + axes @ (-self.cabinet.depth / 2 - OUTSIDE, aside)
         self._height = self.cabinet.floor + GOAL_HEIGHT + up
         return {
             CUP: (float(x), float(y), 0.0),
-            CABINET: (float(place[0]), float(place[1]), turn),
+            CABINET: (*PLACE, turn),
             GOAL: (float(goal_x), float(goal_y), 0.0),
         }
 

@@ -12,8 +12,11 @@ from sim_tasks.tasks.take_cup_out_cabinet import CABINET, GOAL, TakeCupOutCabine
 PITCH = np.radians(12)  # of the hand below the horizontal before a cabinet that faces the robot
 LEVEL = np.radians(8)  # by which it is more level before one that is turned by a right angle
 EASE = 0.8  # yaw of the hand, as a share of the cabinet's turn
-ELBOW = 0.4  # [rad] of the base joint to the side: in the plane of arm and hand the wrist is at its limit
-BEFORE = 0.17  # [m] from the cup to the via point before the opening
+# Turn of the cabinet [rad], and angle [rad] of the base joint towards the side that it faces away from: the elbow
+# swings out as the opening turns aside. Before a cabinet that faces the robot it leans to the other side a little,
+# since in one plane with the hand the wrist would be at its limit.
+TURNS, ELBOWS = (0.25, 1.05, 1.57), (-0.3, 1.0, 1.8)
+BEFORE, AROUND = 0.18, 0.10  # [m] from the cup to the hand before the opening; by which it gives the corner a berth
 LIFT = 0.02  # [m]
 
 
@@ -28,13 +31,16 @@ class TakeCupOutCabinetLeader(MovesLeader[TakeCupOutCabinet]):
         turn = float(np.arctan2(inwards[1], inwards[0]))
         yaw, pitch = EASE * turn, PITCH - LEVEL * abs(turn) / (np.pi / 2)
         cup, goal = world.grasp_point.copy(), world.position(GOAL)
-        elbow = -np.copysign(ELBOW, yaw - np.arctan2(cup[1], cup[0]))
-        via = cup - BEFORE * inwards + self._draw_via(rng)
+        aside = np.sign(yaw - np.arctan2(cup[1], cup[0]))
+        elbow = float(aside * np.interp(abs(turn), TURNS, ELBOWS))
+        before = cup - BEFORE * inwards
+        via = (world.tip + before) / 2 - AROUND * abs(np.sin(turn)) * inwards + self._draw_via(rng)
         up = np.array([0.0, 0.0, LIFT])
         return [
             Move(
                 [
-                    Keyframe(hand_pose(via, pitch, yaw), elbow),
+                    Keyframe(hand_pose(via, pitch, yaw / 2), elbow / 2, straight=True),
+                    Keyframe(hand_pose(before, pitch, yaw), elbow, straight=True),
                     Keyframe(hand_pose(cup, pitch, yaw), elbow, straight=True),
                 ],
                 1.0,
