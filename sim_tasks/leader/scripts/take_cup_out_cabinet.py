@@ -4,52 +4,42 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from er_il.arms.arm import Vector
 from sim_tasks.leader.hand import hand_pose
 from sim_tasks.leader.motion import Keyframe
 from sim_tasks.leader.scripts.moves import Move, MovesLeader
 from sim_tasks.tasks.take_cup_out_cabinet import CABINET, GOAL, TakeCupOutCabinet
 
-PITCH = np.radians(12)  # of the hand below the horizontal before a cabinet that faces the robot
-LEVEL = np.radians(8)  # by which it is more level before one that is turned by a right angle
+# The more the opening faces aside, the more level must the hand be, and the farther must the elbow swing out to the
+# opening's side, or the forearm runs into the cabinet's top. Before a cabinet that faces the robot, the elbow keeps a
+# little out of the hand's plane, in which the wrist would be at its limit.
+TURNS = np.radians((0, 15, 60, 90))  # of the cabinet, either way
+PITCHES = np.radians((12, 11, 7, 4))  # of the hand below the horizontal
+ELBOWS = (-0.3, -0.3, 1.0, 1.8)  # [rad] of the base joint, which turns away from where the elbow swings
+LEAN = 0.1  # [rad] of a joint below the base joint, if the arm has one
 EASE = 0.8  # yaw of the hand, as a share of the cabinet's turn
-# Turn of the cabinet [rad], and angle [rad] of the base joint towards the side that it faces away from: the elbow
-# swings out as the opening turns aside. Before a cabinet that faces the robot it leans to the other side a little,
-# since in one plane with the hand the wrist would be at its limit.
-TURNS, ELBOWS = (0.25, 1.05, 1.57), (-0.3, 1.0, 1.8)
-BEFORE, AROUND = 0.18, 0.10  # [m] from the cup to the hand before the opening; by which it gives the corner a berth
-LIFT = 0.02  # [m]
+BEFORE = 0.18  # [m] from the cup to the hand before the opening
+AROUND = 0.10  # [m] by which the hand gives the corner of a cabinet that is turned by a right angle a wide berth
+LIFT = np.array([0.0, 0.0, 0.02])  # [m]
 
 
 class TakeCupOutCabinetLeader(MovesLeader[TakeCupOutCabinet]):
-    """In through the opening, and out the same way."""
+    """Round the corner, in through the opening, and out the same way."""
 
     avoid = (CABINET,)
 
     def _moves(self, rng: np.random.Generator) -> Sequence[Move]:
         world = self._world
-        inwards = world.rotation(CABINET)[:, 0]
+        cup, goal, inwards = world.grasp_point.copy(), world.position(GOAL), world.rotation(CABINET)[:, 0]
         turn = float(np.arctan2(inwards[1], inwards[0]))
-        yaw, pitch = EASE * turn, PITCH - LEVEL * abs(turn) / (np.pi / 2)
-        cup, goal = world.grasp_point.copy(), world.position(GOAL)
-        aside = np.sign(yaw - np.arctan2(cup[1], cup[0]))
-        elbow = float(aside * np.interp(abs(turn), TURNS, ELBOWS))
+        pitch, yaw = np.interp(abs(turn), TURNS, PITCHES), EASE * turn
+        side = np.sign(yaw - np.arctan2(cup[1], cup[0]))
+        elbow = float(side * np.interp(abs(turn), TURNS, ELBOWS))
+
+        def at(point: Vector, share: float = 1.0) -> Keyframe:
+            """The hand at a point, turned by a share of what it takes inside."""
+            return Keyframe(hand_pose(point, pitch, share * yaw), share * elbow, straight=True, lean=LEAN)
+
         before = cup - BEFORE * inwards
         via = (world.tip + before) / 2 - AROUND * abs(np.sin(turn)) * inwards + self._draw_via(rng)
-        up = np.array([0.0, 0.0, LIFT])
-        return [
-            Move(
-                [
-                    Keyframe(hand_pose(via, pitch, yaw / 2), elbow / 2, straight=True),
-                    Keyframe(hand_pose(before, pitch, yaw), elbow, straight=True),
-                    Keyframe(hand_pose(cup, pitch, yaw), elbow, straight=True),
-                ],
-                1.0,
-            ),
-            Move(
-                [
-                    Keyframe(hand_pose(cup + up, pitch, yaw), elbow, straight=True),
-                    Keyframe(hand_pose(goal, pitch, yaw), elbow, straight=True),
-                ],
-                0.0,
-            ),
-        ]
+        return [Move([at(via, 0.5), at(before), at(cup)], 1.0), Move([at(cup + LIFT), at(goal)], 0.0)]
