@@ -151,11 +151,14 @@ def main(
                 for index, (_, function, arguments) in enumerate(jobs)
                 if index not in done
             }
-            for future in as_completed(running):
-                index = running[future]
-                done[index] = future.result()
-                write_json(kept[index], {"of": asked[index], "row": done[index]})
-                progress.advance(bar)
+            try:
+                for future in as_completed(running):
+                    index = running[future]
+                    done[index] = future.result()
+                    write_json(kept[index], {"of": asked[index], "row": done[index]})
+                    progress.advance(bar)
+            finally:  # a job that cannot be done ends the programme at once
+                executor.shutdown(cancel_futures=True)
     rows: dict[str, list[Any]] = {kind: [] for kind, *_ in jobs}
     for index, (kind, *_) in enumerate(jobs):
         _count(rows[kind], done[index])
