@@ -46,6 +46,14 @@ def prepare(data: Path) -> None:
     recipe = Recipe.load(TASK).resized(3)
     made = generate(recipe, ["joint", "erj"], data / "demos", Progress(disable=True), workers=1)
     shutil.copytree(made.paths["erj"], data / "erj")
+    seen = generate(
+        recipe.replaced(cameras=("wrist",), image_size=32),
+        ["erj"],
+        data / "seen_demos",
+        Progress(disable=True),
+        workers=1,
+    )
+    shutil.copytree(seen.paths["erj"], data / "seen")
     _write_plain(Dataset(made.paths["joint"]), data / "plain")
     training = Training(TASK, "erj", data / "erj", data / "training", default_config("erj"), 2, seed=0)
     with (data / "training.txt").open("w") as log:
