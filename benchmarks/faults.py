@@ -67,8 +67,8 @@ def prepare(data: Path) -> None:
     (data / "robot/arms.yaml").write_text(yaml.safe_dump(wiring))
     (data / "grid").mkdir()
     shutil.copy(Path(__file__).parents[1] / "configs/table1.yaml", data / "grid/grid.yaml")
-    # Of another grid: whatever is read, nothing is computed.
-    other = Grid.from_dict({**Grid.from_file(data / "grid/grid.yaml").to_dict(), "rollouts": 7})
+    # Of another grid, by its title: whatever is read, nothing is computed.
+    other = Grid.from_dict({**Grid.from_file(data / "grid/grid.yaml").to_dict(), "title": "Another grid"})
     with Plan(other, data / "other_grid").claimed():
         pass
 
