@@ -118,8 +118,8 @@ def main(
     """Run the programme; write the report.
 
     Args:
-        kills: Number of kills, over all commands.
-        damages: Number of damaged inputs, over all commands.
+        kills: Number of kills, over all commands, at least one each; 0 for none.
+        damages: Number of damaged inputs, over all commands, at least one each; 0 for none.
         actions: Number of actions for commanders.
         steps: Number of actions for environments.
         seed: Seed of everything that is drawn.
@@ -128,15 +128,17 @@ def main(
     os.environ |= ONE_THREAD
     with TemporaryDirectory() as name:
         folder = Path(name)
-        prepare(data := folder / "data")
+        data = folder / "data"
+        if kills or damages:
+            prepare(data)
         jobs: list[tuple[str, Callable[..., Any], tuple[Any, ...]]] = []
-        planned = commands(data)
+        planned = commands(data) if kills else ()
         total = sum(command.share for command in planned)
         for index, command in enumerate(planned):
             for part, count in _parts(max(1, round(kills * command.share / total)), 10):
                 place = folder / f"kills_{index}_{part}"
                 jobs.append(("kills", kill_often, (index, count, seed + part, data, place)))
-        for index in range(len(TRIALS)):
+        for index in range(len(TRIALS) if damages else 0):
             count = damages // len(TRIALS) + (index < damages % len(TRIALS))
             for part, some in _parts(max(1, count), 30):
                 place = folder / f"inputs_{index}_{part}"
@@ -167,7 +169,7 @@ def main(
                     progress.advance(bar)
             finally:  # a job that cannot be done ends the programme at once
                 executor.shutdown(cancel_futures=True)
-    rows: dict[str, list[Any]] = {kind: [] for kind, *_ in jobs}
+    rows: dict[str, list[Any]] = {kind: [] for kind in ("kills", "inputs", "commands", "environments")}
     for index, (kind, *_) in enumerate(jobs):
         _count(rows[kind], done[index])
     meta = provenance() | {"seed": seed, "task": TASK}
