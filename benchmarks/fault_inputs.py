@@ -1,5 +1,6 @@
 """Commands given damaged datasets, policies, robots and grids: does a line tell the damage, or what happens else?"""
 
+import re
 import shutil
 import warnings
 from collections import Counter
@@ -25,6 +26,8 @@ TOLD, ACCEPTED = "told", "accepted"
 FAULTS = ("traceback", "crash", "hang", "silently wrong")
 POSITION_TOLERANCE = 1e-3  # [m] between an action's pose and that of its joints
 TASK = "push_button_elbow"  # its demonstrations are the shortest
+# What a stock training says, with tracebacks, where torchcodec lacks FFmpeg: LeRobot then decodes videos by PyAV.
+LIBRARY = re.compile(r"\[start of libtorchcodec loading traceback\].*?\[end of libtorchcodec", re.DOTALL)
 _FRAME = ("--ee-frame", "panda_hand_tcp")
 
 
@@ -58,6 +61,8 @@ TRIALS = (
     Trial(("encode", "{input}", "--to", "era", "--out", "out"), "erj", _result_disagrees),
     Trial(("encode", "{input}", "--to", "joint", "--out", "out"), "erj"),
     Trial(("view", "{input}", "--episode", "0", "--save", "out.rrd"), "erj"),
+    Trial(("view", "{input}", "--episode", "0", "--save", "out.rrd"), "seen"),
+    Trial(("encode", "{input}", "--to", "task", "--out", "out"), "seen", _result_disagrees),
     Trial(("advise", "{input}"), "erj"),
     Trial(("replay", "{input}", "--out", "out"), "erj"),
     Trial(("train", TASK, "erj", "--dataset", "{input}", "--steps", "1", "--out", "out"), "erj"),
@@ -77,7 +82,7 @@ def try_damaged(index: int, damages: int, seed: int, data: Path, folder: Path) -
         index: Index of the trial in ``TRIALS``.
         damages: Number of damaged inputs.
         seed: Seed of the damage.
-        data: Folder with the undamaged inputs: ``erj``, ``plain``, ``policy``, ``robot``, ``grid``.
+        data: Folder with the undamaged inputs: ``erj``, ``seen``, ``plain``, ``policy``, ``robot``, ``grid``.
         folder: Folder to work in.
 
     Returns:
@@ -125,7 +130,7 @@ def _outcome(trial: Trial, name: str, spoil: Callable[[Path], None], data: Path,
     said = (place / LOG).read_text(errors="replace").strip()
     if process.exitcode is None or process.exitcode < 0:
         return "crash", f"signal {process.exitcode}"
-    if "Traceback (most recent call last)" in said:
+    if "Traceback (most recent call last)" in LIBRARY.sub("", said):
         return "traceback", said.splitlines()[-1][:300]
     if process.exitcode:
         return (TOLD, "") if said else ("silently wrong", f"exit code {process.exitcode} without a word")

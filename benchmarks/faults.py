@@ -46,6 +46,14 @@ def prepare(data: Path) -> None:
     recipe = Recipe.load(TASK).resized(3)
     made = generate(recipe, ["joint", "erj"], data / "demos", Progress(disable=True), workers=1)
     shutil.copytree(made.paths["erj"], data / "erj")
+    seen = generate(
+        recipe.replaced(cameras=("wrist",), image_size=32),
+        ["erj"],
+        data / "seen_demos",
+        Progress(disable=True),
+        workers=1,
+    )
+    shutil.copytree(seen.paths["erj"], data / "seen")
     _write_plain(Dataset(made.paths["joint"]), data / "plain")
     training = Training(TASK, "erj", data / "erj", data / "training", default_config("erj"), 2, seed=0)
     with (data / "training.txt").open("w") as log:
@@ -59,8 +67,8 @@ def prepare(data: Path) -> None:
     (data / "robot/arms.yaml").write_text(yaml.safe_dump(wiring))
     (data / "grid").mkdir()
     shutil.copy(Path(__file__).parents[1] / "configs/table1.yaml", data / "grid/grid.yaml")
-    # Of another grid: whatever is read, nothing is computed.
-    other = Grid.from_dict({**Grid.from_file(data / "grid/grid.yaml").to_dict(), "rollouts": 7})
+    # Of another grid, by its title: whatever is read, nothing is computed.
+    other = Grid.from_dict({**Grid.from_file(data / "grid/grid.yaml").to_dict(), "title": "Another grid"})
     with Plan(other, data / "other_grid").claimed():
         pass
 
@@ -110,8 +118,8 @@ def main(
     """Run the programme; write the report.
 
     Args:
-        kills: Number of kills, over all commands.
-        damages: Number of damaged inputs, over all commands.
+        kills: Number of kills, over all commands, at least one each; 0 for none.
+        damages: Number of damaged inputs, over all commands, at least one each; 0 for none.
         actions: Number of actions for commanders.
         steps: Number of actions for environments.
         seed: Seed of everything that is drawn.
@@ -120,15 +128,17 @@ def main(
     os.environ |= ONE_THREAD
     with TemporaryDirectory() as name:
         folder = Path(name)
-        prepare(data := folder / "data")
+        data = folder / "data"
+        if kills or damages:
+            prepare(data)
         jobs: list[tuple[str, Callable[..., Any], tuple[Any, ...]]] = []
-        planned = commands(data)
+        planned = commands(data) if kills else ()
         total = sum(command.share for command in planned)
         for index, command in enumerate(planned):
             for part, count in _parts(max(1, round(kills * command.share / total)), 10):
                 place = folder / f"kills_{index}_{part}"
                 jobs.append(("kills", kill_often, (index, count, seed + part, data, place)))
-        for index in range(len(TRIALS)):
+        for index in range(len(TRIALS) if damages else 0):
             count = damages // len(TRIALS) + (index < damages % len(TRIALS))
             for part, some in _parts(max(1, count), 30):
                 place = folder / f"inputs_{index}_{part}"
@@ -151,12 +161,15 @@ def main(
                 for index, (_, function, arguments) in enumerate(jobs)
                 if index not in done
             }
-            for future in as_completed(running):
-                index = running[future]
-                done[index] = future.result()
-                write_json(kept[index], {"of": asked[index], "row": done[index]})
-                progress.advance(bar)
-    rows: dict[str, list[Any]] = {kind: [] for kind, *_ in jobs}
+            try:
+                for future in as_completed(running):
+                    index = running[future]
+                    done[index] = future.result()
+                    write_json(kept[index], {"of": asked[index], "row": done[index]})
+                    progress.advance(bar)
+            finally:  # a job that cannot be done ends the programme at once
+                executor.shutdown(cancel_futures=True)
+    rows: dict[str, list[Any]] = {kind: [] for kind in ("kills", "inputs", "commands", "environments")}
     for index, (kind, *_) in enumerate(jobs):
         _count(rows[kind], done[index])
     meta = provenance() | {"seed": seed, "task": TASK}

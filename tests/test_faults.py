@@ -1,12 +1,15 @@
 """The fault programme, small: a command killed and run again, damaged inputs, actions that mean nothing."""
 
 import json
+import runpy
 import shutil
+import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pytest
 from damage import Damage, damage
+from documented import ROOT, documented
 from fault_actions import fuzz_commanders, fuzz_environments
 from fault_inputs import FAULTS, TRIALS, try_damaged
 from fault_kills import commands, kill_often
@@ -49,6 +52,17 @@ def test_nothing_is_lost_and_damage_is_told(data: Path, tmp_path: Path) -> None:
             found = try_damaged(index, count, 0, data, tmp_path / f"inputs_{index}")
             assert found["damaged"] == count
             assert not sum(found[fault] for fault in FAULTS), found["faults"]
+
+
+def test_the_pages_command_writes_the_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    script, *_ = documented("docs/faults.md", "python benchmarks/faults.py")
+    few = ["--kills", "0", "--damages", "0", "--actions", "60", "--steps", "40", "--out", str(tmp_path)]
+    monkeypatch.setattr(sys, "argv", [script, *few])
+    runpy.run_path(str(ROOT / script), run_name="__main__")
+    report = json.loads((tmp_path / "report.json").read_text())
+    assert report["commands"][0]["actions"] == 60 and report["environments"][0]["actions"] == 40
+    assert report["meta"]["git"] and report["meta"]["seed"] == 0
+    assert not (tmp_path / "jobs").exists()  # all is in the report
 
 
 def test_no_action_leaves_the_limits() -> None:

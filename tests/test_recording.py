@@ -12,7 +12,9 @@ import pytest
 from lerobot.datasets import LeRobotDataset
 from rich.progress import Progress
 
+from er_il.datasets.dataset import Dataset
 from er_il.datasets.demos import Demo, make_world, record_demo
+from er_il.datasets.integrity import check_whole
 from er_il.datasets.normalisation import LEAST_DEVIATION, LEAST_ROTATION, MARGIN
 from er_il.datasets.recipe import Recipe
 from er_il.datasets.record import DatasetRecord
@@ -224,6 +226,21 @@ def test_cameras_are_recorded_once_and_shared(seen):
             error = [np.abs(decoded - demo.images[camera][near]).mean() for near in (step, (step + 60) % len(demo))]
             assert error[0] < 10
             assert error[0] < error[1]
+
+
+def test_a_video_that_is_cut_or_overwritten_is_told(seen, tmp_path):
+    check_whole(Dataset(seen.paths["erj"]))
+    for name, spoil in {
+        "cut": lambda video: video[: len(video) // 2],
+        "zeros": lambda video: bytes(len(video)),
+    }.items():
+        root = shutil.copytree(seen.paths["erj"], tmp_path / name)
+        video = next(root.rglob("*.mp4"))
+        good = video.read_bytes()
+        video.unlink()  # its content is shared
+        video.write_bytes(spoil(good))
+        with pytest.raises(DatasetError, match=f"The video .*{video.name} is damaged"):
+            check_whole(Dataset(root))
 
 
 def test_wrong_requests(tmp_path):

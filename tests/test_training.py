@@ -235,6 +235,21 @@ def test_a_loss_that_is_not_finite_ends_the_training(loss: float, fine: bool):
             update(tracker)
 
 
+@pytest.mark.parametrize(
+    ("error", "raised"),
+    [
+        ("value cannot be converted to type float without overflow", PolicyError),
+        ("mat1 and mat2 shapes cannot be multiplied", RuntimeError),
+    ],
+)
+def test_a_step_of_the_optimizer_beyond_all_numbers_ends_the_training(error: str, raised: type[Exception]):
+    def update(tracker: Any) -> Any:
+        raise RuntimeError(error)
+
+    with pytest.raises(raised, match=error):
+        stop_at_nan(update)(SimpleNamespace(steps=41))
+
+
 def test_a_mistake_of_the_training_is_one_line_and_exit_code_2(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):

@@ -41,7 +41,7 @@ def encode(
     wirings = robot.wirings(redundant, angle_frames)
     console = Console()
     with make_progress(console) as progress:
-        bar = progress.add_task(f"Encode as {to}", total=None)
+        bar = progress.add_task(f"Encode as {to}", total=None, visible=False)  # until a frame is encoded
         written = reencode(
             source,
             out,
@@ -49,7 +49,7 @@ def encode(
             rotation=rotation,
             wirings=wirings,
             keep=keep,
-            on_progress=lambda done, total: progress.update(bar, completed=done, total=total),
+            on_progress=lambda done, total: progress.update(bar, completed=done, total=total, visible=True),
         )
     names = written.layout.encoded_names
     console.print(f"{out}: {len(names)} dimensions: {', '.join(names)}", highlight=False, soft_wrap=True)

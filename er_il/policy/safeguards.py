@@ -35,10 +35,15 @@ def cycle_where_it_was(loader: DataLoaderShard) -> Iterator[Any]:
 
 
 def stop_at_nan(update: Callable[..., tuple[Any, Any]]) -> Callable[..., tuple[Any, Any]]:
-    """Let LeRobot's ``update_policy`` raise a PolicyError when the loss is not finite."""
+    """Let LeRobot's ``update_policy`` raise a PolicyError when the loss, or a step of the optimizer, is not finite."""
 
-    def checked(*args: Any, **kwargs: Any) -> tuple[Any, Any]:
-        tracker, outputs = update(*args, **kwargs)
+    def checked(tracker: Any, *args: Any, **kwargs: Any) -> tuple[Any, Any]:
+        try:
+            tracker, outputs = update(tracker, *args, **kwargs)
+        except RuntimeError as error:
+            if "overflow" not in str(error):
+                raise
+            raise _diverged(f"a step of the optimizer is too large ({error})", tracker.steps + 1) from error
         if not math.isfinite(tracker.loss.val):
             raise _diverged(f"the loss is {tracker.loss.val}", tracker.steps + 1)
         return tracker, outputs
