@@ -79,8 +79,8 @@ def test_demonstrations_succeed_within_velocity_limits_and_are_tracked(task_id: 
                 break
         successes += info["is_success"]
     assert successes == DEMOS
-    # Things that are attached, and what the hand touches while it takes them, hold it up by a few millimetres more.
-    assert worst < (0.005 if task_id in IMITATION else 0.010)
+    # The tasks of reinforcement learning are demonstrated faster; their servos reach their torque limits.
+    assert worst < (0.005 if task_id in IMITATION else 0.030)
 
 
 def test_reach_cup_needs_a_real_change_of_elbow() -> None:
