@@ -6,8 +6,9 @@ import mujoco
 import numpy as np
 
 from er_il.arms.arm import Vector
-from sim_tasks.tasks.object_task import UPRIGHT, WIDTH, ObjectTask, yawed
+from sim_tasks.tasks.object_task import UPRIGHT, WIDTH, yawed
 from sim_tasks.tasks.placement import Placement
+from sim_tasks.tasks.release_task import ReleaseTask
 from sim_tasks.tasks.rewards import Reward, proximity
 from sim_tasks.world.grill import Grill, add_order
 from sim_tasks.world.meat import CHICKEN, GRASP_HEIGHT, STEAK
@@ -22,7 +23,7 @@ ZONE = (0.06, 0.06, 0.025)  # [m] half sides of where on the shelf a piece's und
 CLEAR = 0.002  # [m] by which the order lies above the grate's bars
 
 
-class MeatOffGrill(ObjectTask):
+class MeatOffGrill(ReleaseTask):
     """Take the asked piece and release it on the shelf.
 
     A disc lies where the asked piece lay at the start: blue side up for the steak, yellow for the chicken.
@@ -53,7 +54,7 @@ class MeatOffGrill(ObjectTask):
             grill_yaw_range: The grill is turned up to this far [rad].
             meat_range: Sides [m] of the rectangle on the grate in which each piece lies, one on either side.
             meat_yaw_range: Each piece is turned up to this far [rad] on the grate.
-            kwargs: See :class:`ObjectTask`.
+            kwargs: See :class:`sim_tasks.tasks.object_task.ObjectTask`.
         """
         self._grill_range = sides("grill_range", grill_range)
         self._grill_yaw_range = span("grill_yaw_range", grill_yaw_range)
@@ -102,13 +103,13 @@ class MeatOffGrill(ObjectTask):
         there = self.rotation(GRILL).T @ (self.position(self.asked) - self.position(GRILL))
         return float(np.linalg.norm(np.maximum(np.abs(there - self._zone) - ZONE, 0.0)))
 
-    def _succeeds(self) -> bool:
-        return not self.grasped and self._distance() == 0.0
+    def _in_place(self) -> bool:
+        return self._distance() == 0.0
 
     def _progress(self) -> dict[str, float]:
         distance = self._distance()
         if distance == 0.0:
-            return {"reach": 1.0, "place": 1.0, "release": self.gripper_opening if self.grasped else 1.0}
+            return {"reach": 1.0, "place": 1.0, "release": self.commanded_opening if self.grasped else 1.0}
         if self.held == self.asked:
             return {"reach": 1.0, "place": proximity(distance, WIDTH), "release": 0.0}
         reach = proximity(float(np.linalg.norm(self.tip - self.grasp_point)), WIDTH)

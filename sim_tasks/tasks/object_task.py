@@ -27,7 +27,6 @@ TURN_WIDTH = 0.5  # [rad] of that over every angle
 TIMESTEP = 0.004  # [s] of physics
 ATTACHED, FRICTION = "attached", "friction"
 GRIPS = (ATTACHED, FRICTION)
-FREE = 0.02  # [m] by which a thing that was taken has left its place
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)  # quaternion (w, x, y, z)
 
