@@ -31,6 +31,7 @@ TABLES = {
     "training_times": "training_time",
     "environment_steps": "throughput",
     "kills": "faults",
+    "decisions": "decisions",
     "replays": "replays",
     "cells": "success",
 }
