@@ -18,6 +18,7 @@ from sim_tasks.tasks.placement import Area
 BLOCK = 10  # [px] side of the blocks in which pictures are compared
 SAME = 14  # largest mean difference of a block between a picture and its compressed copy; an object moved by 2 cm: 20
 IMAGE = 128  # [px] side of a camera's image
+INTERVALS = ("speed_range", "closing_range", "other_range", "others_range", "mark_height_range")  # no sides
 ALL = (*TASKS, *RL_TASKS)
 FAR_AWAY = (-50.0, 0.0, 0.0)  # x, y [m], yaw, where no camera sees it
 
@@ -49,7 +50,9 @@ def test_the_published_picture_starts_as_the_world_of_today(entry: TaskEntry):
     start = np.asarray(script["row"]([env.render()]))
     env.close()
     assert difference(start, published[0]) < SAME
-    assert all(difference(one, other) > 2 * SAME for one, other in pairwise(published))
+    assert difference(published[0], published[-1]) > 2 * SAME
+    # A short demonstration rests for a good part of its time, at the end.
+    assert entry not in TASKS or all(difference(one, other) > 2 * SAME for one, other in pairwise(published))
 
 
 @pytest.mark.slow
@@ -105,7 +108,7 @@ def test_the_page_says_how_long_and_how_much_varies(entry: TaskEntry):
     (section,) = [each for each in sections if f"`{entry.task}`" in each.splitlines()[0]]
     assert f"| {entry.max_steps} steps ({entry.max_steps / RATE:g} s)" in section
     for key, sides in Recipe.load(entry.task).randomisation.items():
-        if isinstance(sides, list | tuple) and key not in ("speed_range", "closing_range"):
+        if isinstance(sides, list | tuple) and key not in INTERVALS:
             assert f"{100 * sides[0]:g} × {100 * sides[1]:g} cm (`{key}`)" in section
 
 
