@@ -21,6 +21,7 @@ class ReachTarget(ObjectTask):
     task = "reach_target"
     task_description = "Reach the red ball."
     objects = (BALL,)
+    arms = ("panda", "panda8")
     centre = (0.475, 0.0)  # x, y [m] of the middle of the balls' places
     reward = Reward(reach=0.75, success=0.25)
 
