@@ -71,7 +71,7 @@ def kill(command: Command, undisturbed: "Undisturbed", moment: float, worker: bo
         folder: Empty folder to work in.
 
     Returns:
-        What went wrong; "" if nothing did, ``EARLY`` if there was nothing to kill.
+        What went wrong; "" if nothing did, ``EARLY`` if there was nothing to kill, or nothing left to do.
     """
     process = command.run(folder)
     process.join(moment * undisturbed.seconds)
@@ -85,6 +85,8 @@ def kill(command: Command, undisturbed: "Undisturbed", moment: float, worker: bo
     if worker and children:
         process.join(_PATIENCE)  # the command replaces the worker, or ends and says so
     process.join(_PATIENCE)
+    if contents(folder) == undisturbed.contents:
+        return EARLY
     again = command.run(folder)
     again.join(_PATIENCE)
     if again.is_alive():
@@ -142,7 +144,8 @@ def contents(folder: Path) -> dict[str, str]:
         if path.is_file() and path.suffix in _COMPARED and path.name not in _VOLATILE and "films" not in path.parts:
             content = path.read_bytes()
             if path.suffix == ".json":
-                content = json.dumps(_steady(json.loads(content))).encode()
+                with suppress(ValueError):  # what was killed while it was written
+                    content = json.dumps(_steady(json.loads(content))).encode()
             found[name] = hashlib.sha256(content).hexdigest()
     return found
 

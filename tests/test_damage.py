@@ -14,6 +14,7 @@ import pytest
 from er_il import cli
 from er_il.datasets.dataset import Dataset
 from er_il.datasets.integrity import check_whole
+from er_il.datasets.number_checks import number_problems
 from er_il.datasets.record import DatasetRecord
 from er_il.envs.contract import decodes, policy_contract
 from er_il.experiments.grid import Grid
@@ -134,6 +135,17 @@ def test_a_wrong_value_in_a_dataset_is_told(name: str, edit: Edit, said: str, re
     with pytest.raises(ErIlError) as caught:
         read_all(root)
     assert said in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_a_state_whose_names_are_lost_measures_no_joints(reach_cup: Path, tmp_path: Path) -> None:
+    root = copied(reach_cup / "erj", tmp_path)
+    info = json.loads((root / INFO).read_text())
+    info["features"]["observation.state"]["names"].pop()  # they no longer fit the shape: the dimensions are numbered
+    (root / INFO).write_text(json.dumps(info))
+    read_all(root)
+    dataset = Dataset(root)
+    assert dataset.measured_joints(dataset.layout) is None
+    assert not number_problems(dataset, dataset.layout)
 
 
 @pytest.mark.parametrize("name", [INFO, STATS, TASKS, DATA, EPISODES, "meta/recipe.json"])

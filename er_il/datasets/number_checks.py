@@ -142,7 +142,8 @@ def _pairs(layout: Layout, state: Sequence[str]) -> dict[str, str]:
     """Dimensions of the joint vector, and those of the state that measure the same."""
     pairs = {name: name for name in layout.other_dimensions if name in state}
     for part in layout.parts:
-        pairs |= dict(zip(part.motors.joints, part.motors.state, strict=False))
+        own = zip(part.motors.joints, part.motors.state, strict=False)  # the state may measure none
+        pairs |= {joint: measured for joint, measured in own if measured in state}
     return pairs
 
 
