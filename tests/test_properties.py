@@ -19,7 +19,7 @@ EXACT = 2e-4  # [rad] or [m]
 NEAR_FOLD = 0.05  # conditioning below which a second solution may be nearer the seed
 
 few = settings(max_examples=60, derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-kinds = st.sampled_from(["joint", "task", "erj", "delta_joint", "delta_erj", "era"])
+kinds = st.sampled_from(["joint", "task", "erj", "delta_joint", "delta_erj", "carried_erj", "era"])
 seeds = st.integers(0, 2**32 - 1)
 
 
