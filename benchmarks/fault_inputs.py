@@ -21,7 +21,7 @@ from er_il.datasets.schema import LEADER_JOINTS
 from er_il.kinematics.solver import kinematics_of
 from er_il.spaces.spec import ACTION
 
-PATIENCE = 90.0  # [s] until a command counts as hanging
+PATIENCE = 300.0  # [s] until a command counts as hanging, on a busy machine
 TOLD, ACCEPTED = "told", "accepted"
 FAULTS = ("traceback", "crash", "hang", "silently wrong")
 POSITION_TOLERANCE = 1e-3  # [m] between an action's pose and that of its joints

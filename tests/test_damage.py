@@ -99,6 +99,8 @@ EDITS = [
     (TASKS, drop("task_index"), "numbers no tasks"),
     (TASKS, lambda table: table.slice(0, 0), "lacks the task 0"),
     (DATA, drop("episode_index"), "has no column episode_index"),
+    (DATA, drop("timestamp"), "has no column timestamp"),
+    (DATA, drop("task_index"), "has no column task_index"),
     (DATA, words("action"), "column action"),
     (DATA, ragged("action"), "column action"),
     (DATA, lambda table: table.slice(0, 9), "holds 9 frames"),

@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from er_il.datasets.dataset import EPISODE, EPISODES, INFO, Dataset
 from er_il.datasets.schema import STATE
-from er_il.datasets.tables import parquet_files, read_table
+from er_il.datasets.tables import parquet_files, read_table, reading
 from er_il.spaces.spec import ACTION
 from er_il.support.errors import DatasetError
 from er_il.support.json_files import read_json
@@ -31,6 +32,7 @@ def check_whole(dataset: Dataset) -> None:
         DatasetError: something is missing, damaged, or contradicts the frames; names the file.
     """
     episodes = _episodes(dataset)
+    _check_columns(dataset)
     _check_tasks(dataset)
     _check_stats(dataset)
     for name in (name for name, feature in dataset.features.items() if feature["dtype"] == "video"):
@@ -64,6 +66,16 @@ def _episodes(dataset: Dataset) -> pa.Table:
             f"{dataset.root / EPISODES} is damaged: it does not describe the episodes that the data hold."
         )
     return found
+
+
+def _check_columns(dataset: Dataset) -> None:
+    """Every column that the metadata name is in every file of the data; videos have files of their own."""
+    named = [name for name, feature in dataset.features.items() if feature["dtype"] != "video"]
+    for path in dataset.data_files:
+        with reading(path):
+            held = pq.read_schema(path).names
+        if missing := [name for name in named if name not in held]:
+            raise DatasetError(f"{path} has no column {', '.join(missing)}, though the dataset's metadata name it.")
 
 
 def _check_tasks(dataset: Dataset) -> None:
