@@ -120,8 +120,8 @@ def main(
     Args:
         kills: Number of kills, over all commands, at least one each; 0 for none.
         damages: Number of damaged inputs, over all commands, at least one each; 0 for none.
-        actions: Number of actions for commanders.
-        steps: Number of actions for environments.
+        actions: Number of actions for commanders; 0 for none.
+        steps: Number of actions for environments; 0 for none. A part that is not asked for stays in the report.
         seed: Seed of everything that is drawn.
         out: Folder of the report.
     """
@@ -171,9 +171,13 @@ def main(
                 executor.shutdown(cancel_futures=True)
     rows: dict[str, list[Any]] = {kind: [] for kind in ("kills", "inputs", "commands", "environments")}
     for index, (kind, *_) in enumerate(jobs):
-        _count(rows[kind], done[index])
-    meta = provenance() | {"seed": seed, "task": TASK}
-    write_json(out / "report.json", {"meta": meta, **rows})
+        _count(rows[kind], done[index] | {"git": code})
+    report = out / "report.json"
+    if report.exists():  # what was not asked for this time stays, with the commit that it was found at
+        found_before = json.loads(report.read_text())
+        for kind in (kind for kind in rows if not rows[kind]):
+            rows[kind] = [{"git": found_before["meta"]["git"]} | row for row in found_before[kind]]
+    write_json(report, {"meta": provenance() | {"seed": seed, "task": TASK}, **rows})
     shutil.rmtree(out / "jobs")
     for row in (*rows["kills"], *rows["inputs"]):
         for fault in row["faults"]:

@@ -85,7 +85,7 @@ def test_asking_a_task_without_a_leader_for_a_demonstration_names_those_with_one
     world = gymnasium.make(bare.id).unwrapped
     assert isinstance(world, ArmTask) and issubclass(NoLeaderError, ErIlError)
     world.reset(seed=0)
-    message = "^The task bare_lift has no leader to demonstrate it. Tasks with a leader: lift_cup, .*retrieve_bear.$"
+    message = "^The task bare_lift has no leader to demonstrate it. Tasks with a leader: lift_cup, .*out_of_stand.$"
     with pytest.raises(NoLeaderError, match=message):
         world.leader(0)
     with pytest.raises(NoLeaderError, match="bare_lift has no leader"):

@@ -22,6 +22,8 @@ GRIPPER = "gripper"  # actuator name
 # some 20 ms, so that the hand follows within 5 mm at demo speed.
 STIFFNESS = ((200.0, 36000.0), (50.0, 12000.0), (0.0, 6000.0))
 ARMATURE = 0.1  # [kg m^2] reflected rotor inertia
+HARD_STOP = (0.004, 1.0)  # [s] time constant, damping ratio of the joints' limits: two time steps of 2 ms
+HARD = (0.99, 0.999, 0.001, 0.5, 2.0)  # their impedance: no contact pushes a joint out of its range
 FINGER_KP, FINGER_KV, FINGER_FORCE = 1000.0, 40.0, 35.0  # [N/m], [Ns/m], [N]
 
 # Convex hulls of neighbouring links overlap by design, not by collision.
@@ -99,6 +101,7 @@ def robot_spec(arm: Arm) -> mujoco.MjSpec:
     for joint in arm.joints:
         urdf_joint = spec.joint(joint)
         urdf_joint.armature = ARMATURE
+        urdf_joint.solref_limit, urdf_joint.solimp_limit = HARD_STOP, HARD
         torque = float(urdf_joint.actfrcrange[1])
         servo = spec.add_actuator(name=joint, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
         servo.set_to_position(kp=next(kp for above, kp in STIFFNESS if torque > above), dampratio=1.0)
