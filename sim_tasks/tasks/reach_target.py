@@ -5,6 +5,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from er_il.kinematics.solver import kinematics_of
 from sim_tasks.tasks.object_task import WIDTH, ObjectTask, add_goal
 from sim_tasks.tasks.placement import Placement
 from sim_tasks.tasks.rewards import Reward, proximity
@@ -13,6 +14,7 @@ from sim_tasks.world.randomisation import sides
 BALL = "ball"
 RADIUS = 0.05  # [m] from the ball's centre at which it counts as reached
 HEIGHTS = (0.15, 0.65)  # [m] above the bench
+AWAY = 0.15  # [m] from where the hand starts, at least
 
 
 class ReachTarget(ObjectTask):
@@ -40,9 +42,12 @@ class ReachTarget(ObjectTask):
         add_goal(spec, BALL, 0.03, (0.85, 0.1, 0.1, 1.0))
 
     def _draw(self, rng: np.random.Generator) -> Placement:
-        x, y = np.array(self.centre) + (rng.random(2) - 0.5) * self._ball_range
-        self._height = rng.uniform(*HEIGHTS)
-        return {BALL: (x, y, 0.0)}
+        start = kinematics_of(self.arm).fk(self.nominal_start)[:3, 3]
+        while True:
+            x, y = np.array(self.centre) + (rng.random(2) - 0.5) * self._ball_range
+            self._height = rng.uniform(*HEIGHTS)
+            if np.linalg.norm(start - (x, y, self._height + self.shoulder_offset)) > AWAY:
+                return {BALL: (x, y, 0.0)}
 
     def _arrange(self, placement: Placement) -> None:
         x, y, _ = placement[BALL]

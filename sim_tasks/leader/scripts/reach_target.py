@@ -18,4 +18,4 @@ class ReachTargetLeader(MovesLeader[ReachTarget]):
     def _moves(self, rng: np.random.Generator) -> Sequence[Move]:
         x, y, z = self._world.position(BALL)
         yaw = float(np.arctan2(y, x))
-        return [Move([Keyframe(hand_pose(np.array([x, y, z]), PITCH, yaw), None)], 1.0)]
+        return [Move([Keyframe(hand_pose(np.array([x, y, z]), PITCH, yaw), None, straight=True)], 1.0)]
