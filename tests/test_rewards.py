@@ -80,7 +80,8 @@ def test_random_and_idle_policies_get_clearly_less(task_id: str) -> None:
         low, high = world.action_space.low, world.action_space.high
         random, infos = play(world, (rng.uniform(low, high) for _ in range(world.max_steps)))
         assert not infos[-1]["is_success"]
-        assert random.max() < 0.8 and random.mean() < 0.3
+        # Swung about at random, an arm may meet its goal for a moment.
+        assert np.quantile(random, 0.9) < 0.8 and random.mean() < 0.3
 
 
 @pytest.mark.parametrize("task_id", IDS)
