@@ -11,14 +11,8 @@ from er_il.envs.protocol import LearnableEnv
 from er_il.kinematics.forward import forward_of
 from er_il.support.shapes import POSE_NAMES
 
-TURN_NAMES = (
-    "xx",
-    "xy",
-    "xz",
-    "yx",
-    "yy",
-    "yz",
-)  # its x and y axis: unlike quaternions unique
+TURN_NAMES = ("xx", "xy", "xz", "yx", "yy", "yz")  # x and y axis of a frame: unlike quaternions unique
+_NONE = np.empty((0, 7))
 
 
 class LearningState:
@@ -58,9 +52,6 @@ class LearningState:
             parts.append(self._forward.frame_pose(q, self._elbow)[:3, 3])
         parts += [command - q, (float(world.grasped),), np.hstack([objects[:, :3] - ee, turns[1:]]).ravel()]
         return np.concatenate(parts).astype(np.float32)
-
-
-_NONE = np.empty((0, 7))
 
 
 def axes(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:

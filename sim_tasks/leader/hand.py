@@ -2,6 +2,8 @@
 
 import numpy as np
 
+DOWN = np.radians(89.9)  # pitch of a hand that points straight down
+
 
 def hand_pose(position: np.ndarray, pitch: float, yaw: float = 0.0) -> np.ndarray:
     """T_base_ee (4, 4) of a hand that points forward and down, the fingers level.

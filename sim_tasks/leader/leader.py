@@ -11,6 +11,7 @@ from sim_tasks.leader.motion import Segment
 from sim_tasks.tasks.arm_task import ArmTask
 from sim_tasks.world.randomisation import SLOWEST, interval, span
 
+REST = 0.5  # [s] at the end, beyond the moment of success: a policy must not learn to stop short of it
 DRAWS = 10  # random plans that are tried before the leader gives up
 
 _STREAM = 2  # separates the leader's random numbers from the world's, which are seeded with the seed itself

@@ -37,7 +37,7 @@ class GraspTask(ObjectTask):
     def _progress(self) -> dict[str, float]:
         if self.held == self.target:
             return {"reach": 1.0, "lift": self._lift()}
-        return {"reach": proximity(float(np.linalg.norm(self.tip - self.grasp_point)), WIDTH), "lift": 0.0}
+        return {"reach": self._reach(self.grasp_point), "lift": 0.0}
 
 
 class CarryTask(GraspTask):

@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 
 from er_il.arms.arm import Vector
-from sim_tasks.tasks.object_task import UPRIGHT, WIDTH, yawed
-from sim_tasks.tasks.placement import Placement
+from sim_tasks.tasks.object_task import UPRIGHT, WIDTH
+from sim_tasks.tasks.placement import Placement, yawed
 from sim_tasks.tasks.release_task import ReleaseTask
 from sim_tasks.tasks.rewards import Reward, proximity
 from sim_tasks.world.grill import Grill, add_order
@@ -112,5 +112,5 @@ class MeatOffGrill(ReleaseTask):
             return {"reach": 1.0, "place": 1.0, "release": self.commanded_opening if self.grasped else 1.0}
         if self.held == self.asked:
             return {"reach": 1.0, "place": proximity(distance, WIDTH), "release": 0.0}
-        reach = proximity(float(np.linalg.norm(self.tip - self.grasp_point)), WIDTH)
+        reach = self._reach(self.grasp_point)
         return {"reach": reach, "place": 0.0, "release": 0.0}

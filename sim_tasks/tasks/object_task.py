@@ -15,10 +15,11 @@ from er_il.arms.arm import Vector
 from er_il.support.errors import UnknownNameError
 from sim_tasks.tasks.arm_task import ArmTask
 from sim_tasks.tasks.placement import Placement
+from sim_tasks.tasks.rewards import proximity
 from sim_tasks.world.attachment import Attachment, add_attachments
 from sim_tasks.world.contact import touching
 from sim_tasks.world.grip import slow_grip
-from sim_tasks.world.props import BOX
+from sim_tasks.world.props import BOX, SPHERE
 from sim_tasks.world.robot import TIP
 from sim_tasks.world.scene import BENCH_CENTRE, BENCH_SIZE
 
@@ -108,6 +109,10 @@ class ObjectTask(ArmTask):
         """A point of an object in the base frame (3,) [m], given in the object's frame."""
         return self.position(name) + self.rotation(name) @ np.asarray(offset)
 
+    def _reach(self, point: Vector) -> float:
+        """Closeness in (0, 1] of the fingertips to a point (3,) [m]."""
+        return proximity(float(np.linalg.norm(self.tip - point)), WIDTH)
+
     def _put(self, name: str, position: Sequence[float], quaternion: Sequence[float] = UPRIGHT) -> None:
         """Put an object of an episode that begins: position [m] before a Panda, quaternion (w, x, y, z)."""
         x, y, z = position
@@ -139,13 +144,8 @@ class ObjectTask(ArmTask):
         return "timeout"
 
 
-def yawed(yaw: float) -> tuple[float, float, float, float]:
-    """Quaternion (w, x, y, z) of a turn [rad] about the vertical."""
-    return float(np.cos(yaw / 2)), 0.0, 0.0, float(np.sin(yaw / 2))
-
-
 def add_goal(spec: mujoco.MjSpec, name: str, radius: float, rgba: Sequence[float]) -> mujoco.MjsBody:
     """Add a ball that marks a place: a mocap body that touches nothing."""
     body = spec.worldbody.add_body(name=name, mocap=True)
-    body.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=(radius, 0, 0), rgba=rgba, contype=0, conaffinity=0, group=2)
+    body.add_geom(type=SPHERE, size=(radius, 0, 0), rgba=rgba, contype=0, conaffinity=0, group=2)
     return body

@@ -5,8 +5,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from sim_tasks.tasks.object_task import WIDTH, yawed
-from sim_tasks.tasks.placement import Placement
+from sim_tasks.tasks.object_task import WIDTH
+from sim_tasks.tasks.placement import Placement, yawed
 from sim_tasks.tasks.release_task import ReleaseTask
 from sim_tasks.tasks.rewards import Reward, proximity
 from sim_tasks.world.phone import HANDSET, LENGTH, BaseStation
@@ -97,7 +97,7 @@ class PhoneOnBase(ReleaseTask):
         if self.grasped:
             return {"reach": 1.0, "place": proximity(self._left(), WIDTH), "open": 0.0}
         return {
-            "reach": proximity(float(np.linalg.norm(self.tip - self.point(PHONE, GRIP))), WIDTH),
+            "reach": self._reach(self.point(PHONE, GRIP)),
             "place": 0.0,
             "open": 0.0,
         }

@@ -7,8 +7,7 @@ import numpy as np
 
 from sim_tasks.tasks.among_others import draw_among_others
 from sim_tasks.tasks.carry_task import MARK, CarryTask
-from sim_tasks.tasks.object_task import yawed
-from sim_tasks.tasks.placement import Placement
+from sim_tasks.tasks.placement import Placement, yawed
 from sim_tasks.world.blocks import BLOCK, block
 from sim_tasks.world.household import Rgba
 from sim_tasks.world.randomisation import interval, sides, span

@@ -7,7 +7,7 @@ import numpy as np
 
 from er_il.arms.arm import Vector
 from sim_tasks.tasks.arm_task import ArmTask
-from sim_tasks.tasks.placement import Placement
+from sim_tasks.tasks.placement import Placement, yawed
 from sim_tasks.tasks.rewards import Reward, proximity
 from sim_tasks.world.contact import collision_geoms, distance, touching
 
@@ -46,7 +46,7 @@ class PickTask(ArmTask):
 
     def _place(self, placement: Placement) -> None:
         for name, (x, y, yaw) in placement.items():
-            self.data.joint(name).qpos = (x, y, self.support, np.cos(yaw / 2), 0, 0, np.sin(yaw / 2))
+            self.data.joint(name).qpos = (x, y, self.support, *yawed(yaw))
         self._was_freed = False
 
     def _fingers_on_target(self) -> int:

@@ -7,8 +7,8 @@ import numpy as np
 
 from sim_tasks.tasks.among_others import draw_among_others
 from sim_tasks.tasks.carry_task import GraspTask
-from sim_tasks.tasks.object_task import WIDTH, yawed
-from sim_tasks.tasks.placement import Placement
+from sim_tasks.tasks.object_task import WIDTH
+from sim_tasks.tasks.placement import Placement, yawed
 from sim_tasks.world.household import Rgba
 from sim_tasks.world.randomisation import interval, sides
 from sim_tasks.world.tableware import CUP_HEIGHT, cup

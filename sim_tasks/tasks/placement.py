@@ -34,6 +34,11 @@ class Area:
         return cls((x - length / 2, x + length / 2), (y - width / 2, y + width / 2))
 
 
+def yawed(yaw: float) -> tuple[float, float, float, float]:
+    """Quaternion (w, x, y, z) of a turn [rad] about the vertical."""
+    return float(np.cos(yaw / 2)), 0.0, 0.0, float(np.sin(yaw / 2))
+
+
 def read_options(options: Mapping[str, Any] | None, objects: tuple[str, ...], area: Area) -> tuple[Placement, bool]:
     """What a reset's options say: where objects are placed by hand, and whether the episode goes beyond success.
 

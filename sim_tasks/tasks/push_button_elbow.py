@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from sim_tasks.tasks.arm_task import ArmTask
-from sim_tasks.tasks.placement import Placement
+from sim_tasks.tasks.placement import Placement, yawed
 from sim_tasks.tasks.rewards import Reward, proximity
 from sim_tasks.world.contact import collision_geoms, distance, touching
 from sim_tasks.world.props import PushButton
@@ -67,7 +67,7 @@ class PushButtonElbow(ArmTask):
     def _place(self, placement: Placement) -> None:
         x, y, yaw = placement[BUTTON]
         self.data.mocap_pos[self._pedestal] = (x, y, 0.0)
-        self.data.mocap_quat[self._pedestal] = (np.cos(yaw / 2), 0, 0, np.sin(yaw / 2))
+        self.data.mocap_quat[self._pedestal] = yawed(yaw)
 
     def _pressing(self) -> bool:
         return touching(self.model, self.data, self.elbow, self.cap)

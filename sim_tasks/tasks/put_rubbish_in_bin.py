@@ -7,8 +7,8 @@ import mujoco
 import numpy as np
 
 from er_il.arms.arm import Vector
-from sim_tasks.tasks.object_task import WIDTH, yawed
-from sim_tasks.tasks.placement import Placement
+from sim_tasks.tasks.object_task import WIDTH
+from sim_tasks.tasks.placement import Placement, yawed
 from sim_tasks.tasks.release_task import ReleaseTask
 from sim_tasks.tasks.rewards import Reward, proximity
 from sim_tasks.world.bin import Bin
@@ -99,7 +99,7 @@ class PutRubbishInBin(ReleaseTask):
         rubbish = self.rubbish
         carry = lower = opened = 0.0
         if self.held != RUBBISH:
-            reach = proximity(float(np.linalg.norm(self.tip - rubbish)), WIDTH)
+            reach = self._reach(rubbish)
             return {"reach": reach, "carry": carry, "lower": lower, "open": opened}
         high, low = self.above_rim(HIGH), self.above_rim(LOW)
         if np.linalg.norm(rubbish[:2] - high[:2]) > OVER:

@@ -10,8 +10,8 @@ import mujoco
 import numpy as np
 
 from er_il.arms.arm import Vector
-from sim_tasks.tasks.object_task import TURN_WIDTH, WIDTH, ObjectTask, yawed
-from sim_tasks.tasks.placement import Area, Placement
+from sim_tasks.tasks.object_task import TURN_WIDTH, WIDTH, ObjectTask
+from sim_tasks.tasks.placement import Area, Placement, yawed
 from sim_tasks.tasks.rewards import Reward, proximity
 from sim_tasks.world.contact import touching
 from sim_tasks.world.crockery import Plate, mug
@@ -109,7 +109,7 @@ class ServeCoffeeObstacles(ObjectTask):
         if self._succeeds():
             return {"reach": 1.0, "upright": 1.0, "waypoint": 1.0, "serve": 1.0}
         if not self.grasped:
-            reach = proximity(float(np.linalg.norm(self.tip - self.grasp_point)), WIDTH)
+            reach = self._reach(self.grasp_point)
             return {"reach": reach, "upright": 0.0, "waypoint": 0.0, "serve": 0.0}
         tilt = float(np.arccos(np.clip(self.rotation(MUG)[2, 2], -1.0, 1.0)))
         carried = {"reach": 1.0, "upright": proximity(tilt - UPRIGHT_TILT, TURN_WIDTH)}

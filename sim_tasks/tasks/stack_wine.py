@@ -7,8 +7,8 @@ import mujoco
 import numpy as np
 
 from er_il.arms.arm import Vector
-from sim_tasks.tasks.object_task import TURN_WIDTH, WIDTH, ObjectTask, yawed
-from sim_tasks.tasks.placement import Placement
+from sim_tasks.tasks.object_task import TURN_WIDTH, WIDTH, ObjectTask
+from sim_tasks.tasks.placement import Placement, yawed
 from sim_tasks.tasks.rewards import Reward, proximity
 from sim_tasks.world.randomisation import sides, span
 from sim_tasks.world.tableware import bottle
@@ -95,6 +95,6 @@ class StackWine(ObjectTask):
         if self._succeeds():
             return {"reach": 1.0, "stack": 1.0}
         if not self.grasped:
-            return {"reach": proximity(float(np.linalg.norm(self.tip - self.grasp_point)), WIDTH), "stack": 0.0}
+            return {"reach": self._reach(self.grasp_point), "stack": 0.0}
         distance, angle = self._errors()
         return {"reach": 1.0, "stack": (proximity(distance, WIDTH) + proximity(angle, TURN_WIDTH)) / 2}

@@ -11,8 +11,8 @@ import numpy as np
 
 from er_il.kinematics.redundancy import JointAngle
 from er_il.kinematics.solver import Status, kinematics_of
-from sim_tasks.tasks.object_task import TURN_WIDTH, WIDTH, ObjectTask, yawed
-from sim_tasks.tasks.placement import Area, Placement
+from sim_tasks.tasks.object_task import TURN_WIDTH, WIDTH, ObjectTask
+from sim_tasks.tasks.placement import Area, Placement, yawed
 from sim_tasks.tasks.rewards import Reward, proximity
 from sim_tasks.world.contact import touching
 from sim_tasks.world.fridge import Fridge

@@ -6,8 +6,7 @@ import mujoco
 import numpy as np
 
 from sim_tasks.tasks.carry_task import MARK, CarryTask
-from sim_tasks.tasks.object_task import yawed
-from sim_tasks.tasks.placement import Placement
+from sim_tasks.tasks.placement import Placement, yawed
 from sim_tasks.world.randomisation import sides, span
 from sim_tasks.world.saucepan import KNOB_MIDDLE, Saucepan
 

@@ -5,8 +5,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from sim_tasks.tasks.object_task import WIDTH, ObjectTask, yawed
-from sim_tasks.tasks.placement import Placement
+from sim_tasks.tasks.object_task import WIDTH, ObjectTask
+from sim_tasks.tasks.placement import Placement, yawed
 from sim_tasks.tasks.rewards import Reward, proximity
 from sim_tasks.world.randomisation import sides, span
 from sim_tasks.world.umbrella import HANDLE_HEIGHT, UMBRELLA, UmbrellaStand
@@ -72,5 +72,5 @@ class TakeUmbrellaOutOfStand(ObjectTask):
 
     def _progress(self) -> dict[str, float]:
         if not self.grasped:
-            return {"reach": proximity(float(np.linalg.norm(self.tip - self.handle)), WIDTH), "lift": 0.0}
+            return {"reach": self._reach(self.handle), "lift": 0.0}
         return {"reach": 1.0, "lift": 1.0 if self._left() < NEAR else proximity(self._left(), WIDTH)}

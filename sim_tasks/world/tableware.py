@@ -1,10 +1,7 @@
 """Bottles and cups, as free things; see :mod:`sim_tasks.world.household` for their frames."""
 
-import mujoco
-
-from sim_tasks.world.household import Primitive, Rgba, Thing
-
-CYLINDER, ELLIPSOID = mujoco.mjtGeom.mjGEOM_CYLINDER, mujoco.mjtGeom.mjGEOM_ELLIPSOID
+from sim_tasks.world.household import ELLIPSOID, Primitive, Rgba, Thing
+from sim_tasks.world.props import CYLINDER
 
 GREEN_GLASS, LABEL, CORK = (0.10, 0.32, 0.16, 1.0), (0.93, 0.88, 0.74, 1.0), (0.62, 0.44, 0.26, 1.0)
 COFFEE, CUP_BLUE = (0.20, 0.11, 0.05, 1.0), (0.15, 0.45, 0.90, 1.0)

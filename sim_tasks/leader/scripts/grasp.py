@@ -6,12 +6,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from er_il.arms.arm import Vector
-from sim_tasks.leader.hand import hand_pose
+from sim_tasks.leader.hand import DOWN, hand_pose
 from sim_tasks.leader.motion import Keyframe
 from sim_tasks.leader.scripts.moves import Move, MovesLeader
 from sim_tasks.tasks.carry_task import MARK, CarryTask, GraspTask
 
-DOWN = np.radians(89.9)  # pitch of the hand
 ABOVE = np.array([0.0, 0.0, 0.10])  # [m] from the grasp to the via point
 GENTLE = 0.6  # pace of the last part of the way to the grasp
 

@@ -4,13 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sim_tasks.leader.hand import hand_pose
+from sim_tasks.leader.hand import DOWN, hand_pose
 from sim_tasks.leader.motion import Keyframe
 from sim_tasks.leader.scripts.moves import Move, MovesLeader
 from sim_tasks.tasks.meat_off_grill import GRILL, MeatOffGrill
 from sim_tasks.world.meat import GRASP_HEIGHT
 
-PITCH = np.radians(89.9)  # of the hand below the horizontal
 ABOVE, LIFT = 0.10, 0.06  # [m] over the piece before the grasp; over grate and shelf while it is carried
 UP = np.array([0.0, 0.0, 1.0])
 GAP = 0.003  # [m] between shelf and piece when the fingers open
@@ -27,7 +26,7 @@ class MeatOffGrillLeader(MovesLeader[MeatOffGrill]):
         yaw = float(np.arctan(forward[1] / forward[0]))  # the piece is as good from behind
 
         def hand(point: np.ndarray, height: float) -> np.ndarray:
-            return hand_pose(point + height * UP, PITCH, yaw)
+            return hand_pose(point + height * UP, DOWN, yaw)
 
         piece = world.grasp_point.copy()
         shelf = world.point(GRILL, (*world.grill.shelf_centre, world.grill.shelf + GRASP_HEIGHT))

@@ -9,12 +9,11 @@ from typing import ClassVar
 import numpy as np
 
 from sim_tasks.leader.collision import Collisions
-from sim_tasks.leader.leader import Leader
+from sim_tasks.leader.leader import REST, Leader
 from sim_tasks.leader.motion import Keyframe, Segment, plan_path
 from sim_tasks.tasks.object_task import ObjectTask
 
 ACT_TIME = 0.4  # [s] that the hand rests while the fingers open or close
-REST = 0.5  # [s] at the end, beyond the moment of success: a policy must not learn to stop short of it
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sim_tasks.leader.hand import hand_pose
+from sim_tasks.leader.hand import DOWN, hand_pose
 from sim_tasks.leader.motion import Keyframe
 from sim_tasks.leader.scripts.moves import Move, MovesLeader
 from sim_tasks.tasks.phone_on_base import BASE, GRIP, PHONE, PhoneOnBase
 
-DOWN = np.radians(89.9)  # pitch of the hand over the bench
 ABOVE = np.array([0.0, 0.0, 0.10])  # [m] over the phone
 BEFORE = 0.07  # [m] from the cradle, out of it
 SEATED = 0.002  # [m] from which the phone is let go

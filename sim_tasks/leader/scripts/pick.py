@@ -8,12 +8,11 @@ from typing import ClassVar
 import numpy as np
 
 from sim_tasks.leader.collision import Collisions
-from sim_tasks.leader.leader import Leader
+from sim_tasks.leader.leader import REST, Leader
 from sim_tasks.leader.motion import Keyframe, Segment, plan_path
 from sim_tasks.tasks.pick_task import PickTask
 
 GRASP_TIME = 0.5  # [s] that the hand rests once the fingers are commanded to be closed
-REST = 0.5  # [s] at the end, beyond the moment of success: a policy must not learn to stop short of it
 
 
 class PickLeader[Task: PickTask](Leader[Task]):

@@ -4,12 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sim_tasks.leader.hand import hand_pose
+from sim_tasks.leader.hand import DOWN, hand_pose
 from sim_tasks.leader.motion import Keyframe
 from sim_tasks.leader.scripts.moves import Move, MovesLeader
 from sim_tasks.tasks.put_rubbish_in_bin import BIN, HIGH, LOW, TOMATOES, PutRubbishInBin
 
-DOWN = np.radians(89.9)  # pitch of the hand
 ABOVE = np.array([0.0, 0.0, 0.10])  # [m] over the rubbish
 SIDEWAYS = (0.35, 0.4)  # paces of reaching and carrying: the follower lags with the hand's speed
 

@@ -7,9 +7,8 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from er_il.kinematics.solver import Status, kinematics_of
 from er_il.support.errors import PlanError
-from sim_tasks.leader.leader import Leader
+from sim_tasks.leader.leader import REST, Leader
 from sim_tasks.leader.motion import Segment
-from sim_tasks.leader.scripts.moves import REST
 from sim_tasks.tasks.reach_elbow_pose import ELBOW, ELBOW_GOAL, HAND_GOAL, REACHED, ReachElbowPose
 
 WAYPOINTS = 12

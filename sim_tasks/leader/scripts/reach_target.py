@@ -1,4 +1,4 @@
-"""The scripts of the tasks that are done once the arm is somewhere."""
+"""The script of Reach Target."""
 
 from collections.abc import Sequence
 
