@@ -150,7 +150,7 @@ class Commander:
         target = self._eased(decoded, action, q) if follows else decoded.q
         latency = time.perf_counter() - started
         self._stopped |= self.on_invalid == STOP and status is not Status.OK
-        asked = float(np.max(np.abs(decoded.q - last)))
+        asked = float(np.abs(decoded.q - last).max())
         nearer = self._limited(last, target)
         follows = follows and not self._stopped and not self._runs_away(nearer, q)
         if follows:
@@ -182,17 +182,17 @@ class Commander:
         return decoded.q if eased is None else eased
 
     def _far(self, target: Vector, measured: Vector) -> bool:
-        return bool(np.any(np.abs(target - measured) > JUMP_PERIODS * self._reach))
+        return bool((np.abs(target - measured) > JUMP_PERIODS * self._reach).any())
 
     def _runs_away(self, command: Vector, q: ArrayLike) -> bool:
         """True if a command would leave behind an arm that does not come along: it waits for it instead."""
         measured = np.asarray(q, dtype=np.float64)
         lead, before = np.abs(command - measured), np.abs(self.last - measured)
-        return bool(np.any((lead > LEAD_PERIODS * self._reach) & (lead > before)))
+        return bool(((lead > LEAD_PERIODS * self._reach) & (lead > before)).any())
 
     def _limited(self, last: Vector, target: Vector) -> Vector:
         """Go towards the target as far as the slowest joint may; all joints together, on a straight line."""
         way = target - last
-        excess = float(np.max(np.abs(way) / self._reach))
+        excess = float((np.abs(way) / self._reach).max())
         step = way if excess <= 1.0 else way / excess
         return self.space.arm.within_limits(last + step)

@@ -79,7 +79,7 @@ class VectorCommander:
                 arm.stop()
         if all(each.followed for each in commands):
             self._others = np.where(np.isfinite(others), others, self._others)
-        if not np.all(np.isfinite(self._others)):
+        if not np.isfinite(self._others).all():
             values = zip(layout.other_dimensions, self._others, strict=True)
             unknown = ", ".join(name for name, value in values if not np.isfinite(value))
             raise ErIlError(f"Nothing is known of {unknown}: the action is not finite, nor is it measured.")

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from er_il.arms.arm import Vector
 from er_il.envs.protocol import LearnableEnv
 from er_il.kinematics.forward import forward_of
+from er_il.kinematics.rotation import quaternion_rows
 from er_il.support.shapes import POSE_NAMES
 
 TURN_NAMES = ("xx", "xy", "xz", "yx", "yy", "yz")  # x and y axis of a frame: unlike quaternions unique
@@ -56,15 +57,5 @@ class LearningState:
 
 def axes(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
     """The x and y axes (N, 6) of frames whose orientations are unit quaternions (N, 4) (x, y, z, w)."""
-    x, y, z, w = quaternions.T
-    return np.stack(
-        [
-            1 - 2 * (y * y + z * z),
-            2 * (x * y + z * w),
-            2 * (x * z - y * w),
-            2 * (x * y - z * w),
-            1 - 2 * (x * x + z * z),
-            2 * (y * z + x * w),
-        ],
-        axis=1,
-    )
+    rows = (quaternion_rows(*quaternion) for quaternion in quaternions.tolist())
+    return np.array([(a[0], b[0], c[0], a[1], b[1], c[1]) for a, b, c in rows])

@@ -49,6 +49,7 @@ class ForwardKinematics:
         self._ee = self._model.getFrameId(arm.ee_frame)
         self._mounted: dict[int, Mounted] = {}
         self._known: dict[tuple[str, ...], tuple[list[int], Array]] = {}
+        self._ids = {frame.name: index for index, frame in reversed(list(enumerate(self._model.frames)))}
         self._at_origin = self._T_base_world.isIdentity()
 
     def fk(self, q: ArrayLike) -> Array:
@@ -229,9 +230,9 @@ class ForwardKinematics:
         return self._T_base_world * pin.updateFramePlacement(self._model, self._data, frame)
 
     def _frame_id(self, frame: str) -> int:
-        if not self._model.existFrame(frame):
+        if frame not in self._ids:
             raise UnknownNameError("frame", frame, [f.name for f in self._model.frames])
-        return self._model.getFrameId(frame)
+        return self._ids[frame]
 
     def _model_q(self, q: Vector) -> Vector:
         full = np.zeros(self._model.nq)

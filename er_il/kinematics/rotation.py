@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
+import pinocchio as pin  # pyright: ignore[reportMissingImports]
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -121,6 +122,11 @@ def quaternion_rows(x: Any, y: Any, z: Any, w: Any) -> tuple[Components, Compone
         (2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)),
         (2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)),
     )
+
+
+def turn_by(w: Array) -> Array:
+    """The rotation matrix (3, 3) of a rotation vector w (3,) [rad]."""
+    return pin.exp3(w)
 
 
 def _unit(v: Array) -> Array:

@@ -20,15 +20,16 @@ from scipy.linalg import lapack
 from er_il.arms.arm import POSE_DOF, Arm, Vector
 from er_il.kinematics.forward import ForwardKinematics
 from er_il.kinematics.goal import POSITION_TOLERANCE, Attempt, Goal, Miss
-from er_il.kinematics.qp import MAX_STEP, PoseQp
+from er_il.kinematics.qp import PoseQp
 from er_il.kinematics.redundancy import Array
 
 MAX_ITERATIONS = 50
 DAMPING_GROWTH = 1e-2  # [1] damping per squared miss in m and rad
 CAUTION = 10.0  # damping grows by this factor after a step that overshot, and shrinks after one that did not
+FAR = 0.3  # [rad] a solution this far from the seed is looked at with suspicion
 CLOSE = 0.12  # [m and rad] goals so close to the seed are tried by quick steps:
 QUICK = 5  # at most so many looks at what is left, each at most half of the one before,
-LAST = 3e-6  # [m and rad] from here by a last step, whose end is not looked at
+LAST = 1e-4  # [m and rad] from here by a last step, whose end is not looked at
 POLISH = 1e-8  # [m and rad] solve this far: the last steps are quadratic, and near a fold joints need it
 SLOW = 0.95  # a step that leaves more of the miss than this is slow,
 PATIENCE = 6  # and so many in a row, the goal still missed, mean that it is out of reach
@@ -37,6 +38,7 @@ STALL = 1e-10  # [rad] a step this small changes nothing: stop early
 FOLD = 3e-2  # smallest singular value (m and rad mixed) below which another solution may lie close by
 FOLD_REACH = 0.5  # [rad] how far away that other solution is looked for
 FOLD_MARGIN = 0.05  # [rad] by how much its first guess may look farther from the seed
+OPEN = 5e-2  # smallest singular value at a seed above which it never was worth while to try others (it was to 0.036)
 NEAR = 0.3  # [m and rad] a goal this close to the seed deserves further attempts
 ASIDE = (0.1, -0.1, 0.2, -0.2)  # [rad] how far beside the seed they start
 FEW_ITERATIONS = 12
@@ -71,7 +73,7 @@ class LocalSearch:
                 return None
             if miss.size <= LAST:
                 q = q if goal.equations else program.read()
-                near = max(map(abs, (q - start).tolist())) <= MAX_STEP
+                near = max(map(abs, (q - start).tolist())) <= FAR
                 return self._last(program, q, miss) if near else None
             largest = miss.size / 2.0
             try:
@@ -150,11 +152,15 @@ class LocalSearch:
         """A better solution than ``found``, from beside the seed, if there is one.
 
         Starts lie along the direction in which the goal is least sensitive: where a goal close to
-        the seed was missed, or met only far away, a fold or the elbow's axis lay in between.
+        the seed was missed, or met only far away, a fold or the elbow's axis lay in between. A seed whose smallest
+        singular value is above ``OPEN`` is too far from any for that.
         """
         if not self._determined(goal) or self._measured(goal, seed, self._program(goal, False).place(seed)).size > NEAR:
             return None
-        v = self._embedded(goal, np.linalg.svd(self.derivative(goal, seed))[2][-1])
+        _, slopes, right = np.linalg.svd(self.derivative(goal, seed))
+        if slopes[-1] > OPEN:
+            return None
+        v = self._embedded(goal, right[-1])
         starts = (self.arm.within_limits(seed + share * v) for share in ASIDE)
         attempts = [found, *(self.run(goal, start, limit=FEW_ITERATIONS) for start in starts)]
         reached = [attempt for attempt in attempts if attempt.reached]

@@ -15,10 +15,8 @@ from er_il.kinematics.chain import chunks, to_numpy
 from er_il.kinematics.forward import ForwardKinematics
 from er_il.kinematics.goal import Attempt, Goal
 from er_il.kinematics.redundancy import Array, Redundancy
-from er_il.kinematics.search import LIMIT_MARGIN, LocalSearch
+from er_il.kinematics.search import FAR, LIMIT_MARGIN, LocalSearch
 from er_il.support.errors import ShapeError
-
-FAR = 0.3  # [rad] a solution this far from the seed is looked at with suspicion
 
 
 class Status(StrEnum):

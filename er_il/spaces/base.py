@@ -107,8 +107,8 @@ class ArmSpace(ABC):
         Args:
             action: (dim,) as a policy gives it; rotations are normalised.
             seed: (n,) [rad] the arm's measured angles, where IK starts.
-            current: (n,) [rad] the last command, which a delta counts from; the seed if omitted.
-                Absolute spaces do not need it.
+            current: (n,) [rad] the last command, which a delta counts from, and its IK starts from; the seed if
+                omitted. Absolute spaces do not need it.
         """
         command = checked_action(action, self.kind, self.names)
         start = self._within_limits("The seed", seed)

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from er_il.arms.arm import Arm, Vector
+from er_il.kinematics.rotation import turn_by
 from er_il.kinematics.solver import IkResult, Status
 from er_il.spaces.base import ArmSpace, Array
 from er_il.spaces.pose import PoseSpace
@@ -119,7 +120,7 @@ class DeltaSpace(ArmSpace):
         clipped = bool(np.any(np.abs(action) > self.limits * (1.0 + TOLERANCE)))
         space = self.absolute
         if isinstance(space, PoseSpace):
-            decoded = space.solve(*self._target(space, change, current), seed)
+            decoded = space.solve(*self._target(space, change, current), current)
         else:
             decoded = space.decode(current + change, seed)
         return replace(decoded, status=Status.LIMIT) if clipped and decoded.status is Status.OK else decoded
@@ -128,7 +129,7 @@ class DeltaSpace(ArmSpace):
         """The pose (4, 4) and the redundancy values to which a change leads from the last command."""
         T_base_ee = self._start(space, change, current)
         T_base_ee[:3, 3] += change[:3]
-        T_base_ee[:3, :3] = Rotation.from_rotvec(change[3:6]).as_matrix() @ T_base_ee[:3, :3]
+        T_base_ee[:3, :3] = turn_by(change[3:6]) @ T_base_ee[:3, :3]
         return T_base_ee, space.redundancy_along(current[None])[0] + change[6:]
 
     def _start(self, space: PoseSpace, change: Vector, current: Vector) -> Array:

@@ -7,6 +7,7 @@ base). Encoded, it holds each arm's commands, one arm after the other, then ever
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import accumulate, pairwise
 from typing import Any
 
 import numpy as np
@@ -107,13 +108,13 @@ class Layout:
     def _joints(self) -> bool:
         return self.kind == JOINT
 
-    def indices(self, part: Part) -> list[int]:
+    def indices(self, part: Part) -> NDArray[np.int_]:
         """Positions of an arm's joints in the joint vector."""
         return self._indices[part.label]
 
     @cached_property
-    def _indices(self) -> dict[str, list[int]]:
-        return {part.label: [self.names.index(joint) for joint in part.motors.joints] for part in self.parts}
+    def _indices(self) -> dict[str, NDArray[np.int_]]:
+        return {part.label: np.array([self.names.index(j) for j in part.motors.joints]) for part in self.parts}
 
     def angles(self, part: Part, vectors: ArrayLike) -> Array:
         """Angles (..., n) [rad] of an arm in joint vectors (..., D)."""
@@ -140,9 +141,8 @@ class Layout:
         """Split encoded vectors (..., E) into each arm's action (..., dim) and the other dimensions (..., k)."""
         if self._joints:
             return self.split(encoded)
-        ends = np.cumsum([len(part.names) for part in self.parts])
-        *actions, others = np.split(encoded, ends, axis=-1)
-        return actions, others
+        ends = list(accumulate((len(part.names) for part in self.parts), initial=0))
+        return [encoded[..., start:end] for start, end in pairwise(ends)], encoded[..., ends[-1] :]
 
     def join_encoded(self, actions: Sequence[Array], others: Array) -> Array:
         """The encoded vectors (..., E) that :meth:`split_encoded` takes apart."""

@@ -13,7 +13,8 @@ from er_il.kinematics.batch import BatchGoal
 from er_il.kinematics.chain import chunks, constant
 from er_il.kinematics.redundancy import Redundancy
 from er_il.kinematics.rotation import Quaternion, RotationCode, RotationError
-from er_il.kinematics.solver import FAR, IkResult, Kinematics, Status, kinematics_of
+from er_il.kinematics.search import FAR
+from er_il.kinematics.solver import IkResult, Kinematics, Status, kinematics_of
 from er_il.spaces.base import ArmSpace, Array
 
 POSITION_NAMES = ("ee.x", "ee.y", "ee.z")

@@ -33,6 +33,7 @@ SIDE = np.array(
 MIRROR = np.array([-1, 1, -1, 1, -1, 1, -1])  # turns it to the left, the last joint about STRAIGHT
 STRAIGHT = np.array([0, 0, 0, 0, 0, 0, np.pi / 4])  # [rad] with which the hand is square to the forearm
 SPREAD = 0.4  # [rad] of the postures from which goals are sought
+POSTURE_DIGITS = 4  # of a posture's angles [rad]
 MARGIN = 0.1  # [rad] between a goal's posture and the joints' limits
 RED, GREEN = (0.85, 0.10, 0.10, 1.0), (0.15, 0.65, 0.20, 0.6)
 
@@ -100,7 +101,7 @@ class ReachElbowPose(ObjectTask):
         seed = self.nominal_start
         seed[-len(SIDE) :] = STRAIGHT + (SIDE - STRAIGHT) * (MIRROR if rng.random() < 0.5 else 1)
         ik = kinematics.solve(T_base_hand, seed + rng.uniform(-SPREAD, SPREAD, arm.dof))
-        q = ik.q.round(9)  # its last bits differ from process to process
+        q = ik.q.round(POSTURE_DIGITS)  # a free elbow is found a little differently from process to process
         if ik.status is not Status.OK or np.any((q < arm.lower + MARGIN) | (q > arm.upper - MARGIN)):
             return None
         points = [tuple(kinematics.frame_pose(q, link)[:3, 3]) for link in (SHOULDER, ELBOW, WRIST)]

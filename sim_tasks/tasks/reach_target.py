@@ -1,5 +1,6 @@
 """Reach Target: bring the hand to a ball in free space (paper V-A)."""
 
+import math
 from typing import Any
 
 import mujoco
@@ -54,7 +55,7 @@ class ReachTarget(ObjectTask):
         self._put(BALL, (x, y, self._height))
 
     def _distance(self) -> float:
-        return float(np.linalg.norm(self.tip - self.position(BALL)))
+        return math.dist(self.tip, self.position(BALL))
 
     def _succeeds(self) -> bool:
         return self._distance() < RADIUS

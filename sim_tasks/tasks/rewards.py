@@ -3,8 +3,6 @@
 import math
 from collections.abc import Mapping
 
-import numpy as np
-
 SUCCESS = "success"
 
 
@@ -24,7 +22,7 @@ class Reward:
     def terms(self, progress: Mapping[str, float], success: bool) -> dict[str, float]:
         """Terms of the reward by name, which sum to it; ``progress`` holds that of each stage."""
         complete = dict(progress) | {SUCCESS: float(success)}
-        return {name: weight * float(np.clip(complete[name], 0.0, 1.0)) for name, weight in self.weights.items()}
+        return {name: weight * min(max(complete[name], 0.0), 1.0) for name, weight in self.weights.items()}
 
 
 def total(terms: Mapping[str, float]) -> float:

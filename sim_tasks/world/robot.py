@@ -75,7 +75,7 @@ class RobotModel:
 
     def joint_positions(self, data: mujoco.MjData) -> np.ndarray:
         """Measured joint angles (n,) [rad], a copy."""
-        return data.qpos[self.joint_qpos].copy()
+        return data.qpos[self.joint_qpos]
 
     def opening(self, data: mujoco.MjData) -> float:
         """Measured opening of the gripper in [0, 1]."""

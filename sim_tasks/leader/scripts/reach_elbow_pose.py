@@ -9,7 +9,14 @@ from er_il.kinematics.solver import Status, kinematics_of
 from er_il.support.errors import PlanError
 from sim_tasks.leader.leader import REST, Leader
 from sim_tasks.leader.motion import Segment
-from sim_tasks.tasks.reach_elbow_pose import ELBOW, ELBOW_GOAL, HAND_GOAL, REACHED, ReachElbowPose
+from sim_tasks.tasks.reach_elbow_pose import (
+    ELBOW,
+    ELBOW_GOAL,
+    HAND_GOAL,
+    POSTURE_DIGITS,
+    REACHED,
+    ReachElbowPose,
+)
 
 WAYPOINTS = 12
 
@@ -38,5 +45,5 @@ class ReachElbowPoseLeader(Leader[ReachElbowPose]):
         elbow = kinematics.frame_pose(path[-1], ELBOW)[:3, 3]
         if np.linalg.norm(elbow - world.position(ELBOW_GOAL)) > REACHED:
             raise PlanError("No posture is known in which hand and elbow are both at their goals.")
-        # Solutions of IK differ in the last bits from process to process, and servos at their limits amplify that.
-        return [Segment(np.array(path).round(12), gripper=1.0, hold=REST)], self._draw_speed(rng)
+        # The elbow is free, and found a little differently from process to process.
+        return [Segment(np.array(path).round(POSTURE_DIGITS), gripper=1.0, hold=REST)], self._draw_speed(rng)
