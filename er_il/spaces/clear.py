@@ -23,7 +23,7 @@ Clearances = Callable[[Vector, float], Vector]  # see :class:`er_il.envs.protoco
 
 ENOUGH = 0.15  # [m] between a link and the world; more is not sought
 STEEPNESS = 4.0  # [1] by which the cost of being near grows towards contact, so that near links count more
-STRIDE, STRIDES = 0.2, 25  # [rad] over all joints between the looks at the self-motion, and how many each way
+STRIDE, STRIDES = 0.25, 16  # [rad] over all joints between the looks at the self-motion, and how many each way
 EFFORT = 0.01  # [1/rad] of cost that a way along the self-motion must save
 
 
