@@ -49,15 +49,20 @@ def walk(kinematics: ForwardKinematics, T_base_ee: Array, q: Vector, tangent: Ve
     while True:
         q = q + step * tangent
         for _ in range(CORRECTIONS):
-            J, gap = kinematics.jacobian(q), kinematics.pose_gap(T_base_ee, q)
-            q = q + J.T @ np.linalg.solve(J @ J.T + LEAST * np.eye(POSE_DOF), gap)
-        if np.any((q < arm.lower) | (q > arm.upper)) or gap @ gap > OFF:
+            q = q + _least_change(kinematics.jacobian(q), kinematics.pose_gap(T_base_ee, q))
+        gap = kinematics.pose_gap(T_base_ee, q)
+        if np.any((q < arm.lower) | (q > arm.upper)) or gap @ gap > OFF**2:
             return
         yield q
-        ahead = _projected(J, tangent)
+        ahead = _projected(kinematics.jacobian(q), tangent)
         tangent = ahead / np.linalg.norm(ahead)
 
 
 def _projected(J: Array, change: Vector) -> Vector:
     """A change (n,) of the joints without its part that moves the end effector."""
-    return change - J.T @ np.linalg.solve(J @ J.T + LEAST * np.eye(POSE_DOF), J @ change)
+    return change - _least_change(J, J @ change)
+
+
+def _least_change(J: Array, motion: Vector) -> Vector:
+    """The smallest change (n,) of the joints that moves the end effector by ``motion`` (6,) [m and rad]."""
+    return J.T @ np.linalg.solve(J @ J.T + LEAST * np.eye(POSE_DOF), motion)
