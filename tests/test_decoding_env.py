@@ -18,17 +18,17 @@ def test_tasks_have_names():
         task_id("reach_cap")
 
 
-def test_reports_know_every_space_and_both_decoders_of_task_space():
-    assert {"joint", "erj", "task-nearest", "task-posture"} <= set(DECODERS)
+def test_reports_know_every_space_and_all_decoders_of_task_space():
+    assert {"joint", "erj", "task-nearest", "task-posture", "task-clear"} <= set(DECODERS)
     assert "task" not in DECODERS
-    with pytest.raises(UnknownNameError, match=r"task-nearest, task-posture"):
+    with pytest.raises(UnknownNameError, match=r"task-nearest, task-posture, task-clear"):
         decoder("task")
-    with pytest.raises(UnknownNameError, match="nearest, posture"):
+    with pytest.raises(UnknownNameError, match="nearest, posture, clear"):
         Decoder("task", "random")
 
 
 @pytest.mark.filterwarnings("ignore:.*(Box action space|unwrapped version):UserWarning")
-@pytest.mark.parametrize("name", ["joint", "erj", "task-nearest", "task-posture"])
+@pytest.mark.parametrize("name", ["joint", "erj", "task-nearest", "task-posture", "task-clear"])
 def test_it_is_a_gymnasium_environment(name: str):
     env = make_action_space_env(REACH, DECODERS[name])
     check_env(env, skip_render_check=True)

@@ -77,10 +77,17 @@ def test_neither_the_batch_nor_the_number_of_episodes_changes_an_outcome(policie
     assert len({e.joint_step for e in runs[0]}) == 4  # or equality would say nothing
 
 
-def test_both_decoders_of_task_space_take_the_task_policy(policies: dict[str, Path]):
-    for name in ("task-nearest", "task-posture"):
+def test_all_decoders_of_task_space_take_the_task_policy(policies: dict[str, Path]):
+    for name in ("task-nearest", "task-posture", "task-clear"):
         (rollout,) = evaluate(policies["task"], "reach_cup", name, episodes=1)
         assert rollout.statuses.total() == rollout.steps
+
+
+def test_every_rollout_keeps_clear_of_its_own_world(policies: dict[str, Path]):
+    together = evaluate(policies["task"], "reach_cup", "task-clear", episodes=2)
+    assert outcomes(together) == outcomes(
+        evaluate(policies["task"], "reach_cup", "task-clear", episodes=2, batch_size=1)
+    )
 
 
 def test_a_policy_of_another_space_is_refused(policies: dict[str, Path]):

@@ -40,7 +40,7 @@ def test_the_action_is_the_spaces(space: str, rotation: str, dim: int):
     [
         ({"task": "reach_cap"}, "lift_cup.*reach_cup"),
         ({"action_space": "jiont"}, "joint, task, erj"),
-        ({"action_space": "task", "resolution": "best"}, "nearest, posture"),
+        ({"action_space": "task", "resolution": "best"}, "nearest, posture, clear"),
         ({"rotation": "euler"}, "quat, rot6d"),
         ({"on_invalid": "panic"}, "best_effort, hold, stop"),
     ],

@@ -33,7 +33,7 @@ def test_joint_and_erj_repeat_the_demo_and_task_space_loses_the_elbow(datasets, 
     DatasetRecord(RECIPE, {1: "collision"}).write(datasets["erj"])  # as if the leader had failed once
     cells = replay(list(datasets.values()), 1, lambda path, name, done, total: seen.append((path.name, name, done)))
     by_name = {cell.decoder: cell for cell in cells}
-    assert list(by_name) == ["joint", "task-nearest", "task-posture", "erj"]
+    assert list(by_name) == ["joint", "task-nearest", "task-posture", "task-clear", "erj"]
     assert by_name["joint"].successes == by_name["erj"].successes == 2
     assert max(demo.deviation for demo in by_name["joint"].demos) < 1e-6  # the same commands: the same motion
     assert max(demo.deviation for demo in by_name["erj"].demos) < 1e-2
@@ -43,7 +43,7 @@ def test_joint_and_erj_repeat_the_demo_and_task_space_loses_the_elbow(datasets, 
     write_report(cells, {"datasets": 3}, tmp_path / "out" / "report.json")
     report = json.loads((tmp_path / "out" / "report.json").read_text())
     assert report["meta"] == {"datasets": 3}
-    cell = report["cells"][3]
+    cell = report["cells"][4]
     assert (cell["task"], cell["decoder"], cell["successes"], cell["episodes"]) == ("reach_cup", "erj", 2, 2)
     assert cell["interval"] == pytest.approx([0.1581, 1.0], abs=1e-4)
     assert report["cells"][1]["failures"] == {"collision": 2}

@@ -17,9 +17,10 @@ def test_the_pages_commands_write_the_table(tmp_path: Path, monkeypatch: pytest.
     run("er-il", name, *map(str, sorted(tmp_path.glob(pattern))), *options)
     report = json.loads(Path("results/tasks/report.json").read_text())
     assert {cell["decoder"]: cell["successes"] for cell in report["cells"]} == dict.fromkeys(
-        ("joint", "erj", "era", "task-nearest", "task-posture"), 2
+        ("joint", "erj", "era", "task-nearest", "task-posture", "task-clear"), 2
     )
     table = runpy.run_path(str(ROOT / "docs/render_readme.py"))["shown"](report)
     heading, _, row = table.splitlines()
-    assert "Leader | joint | erj | era | task-nearest | task-posture | Reward at the start, at most" in heading
-    assert row.startswith("| `reach_target` | 2/2 | 2/2 | 2/2 | 2/2 | 2/2 | 2/2 |") and row.endswith("| 1.00 |")
+    decoders = "joint | erj | era | task-nearest | task-posture | task-clear"
+    assert f"Leader | {decoders} | Reward at the start, at most" in heading
+    assert row.startswith("| `reach_target` | 2/2 | 2/2 | 2/2 | 2/2 | 2/2 | 2/2 | 2/2 |") and row.endswith("| 1.00 |")

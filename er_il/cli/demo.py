@@ -21,7 +21,7 @@ def demo(
         out: Folder of everything that it makes; outputs/demo if omitted (outputs/<task> for another task).
         seed: Seed of the demonstrations and the trainings.
         task: Task, such as reach_cup or lift_cup.
-        decoders: Decoders to compare, separated by commas: joint, erj, era, task-nearest, task-posture.
+        decoders: Decoders to compare, separated by commas: joint, erj, era, task-nearest, task-posture, task-clear.
         demonstrations: Number of demonstrations; the recipe's if omitted.
         steps: Training steps of a policy; the configuration's if omitted.
         rollouts: Number of rollouts of each decoder.

@@ -16,7 +16,7 @@ from lerobot.utils.constants import ACTION, OBS_ENV_STATE, OBS_IMAGES, OBS_STATE
 from er_il.arms.arm import Arm
 from er_il.control.commander import BEST_EFFORT, check_answer
 from er_il.envs.contract import check_policy
-from er_il.envs.decoders import NEAREST, Decoder
+from er_il.envs.decoders import CLEAR, NEAREST, Decoder
 from er_il.envs.side_by_side import BATCH_FROM, BatchDecodingEnv, ProcessesEnv, SideBySideEnv
 from er_il.envs.tasks import task_id
 from er_il.envs.wrapper import ActionSpaceEnv, make_action_space_env
@@ -32,7 +32,7 @@ class ErIlEnvConfig(EnvConfig):
     Attributes:
         action_space: ``joint``, ``task``, ``erj``, ``era``, or ``erj@<joint>`` if ERJ commands another joint;
             with ``delta_`` in front, changes of its commands.
-        resolution: What IK does with the freedom that task space leaves: ``nearest`` or ``posture``.
+        resolution: What IK does with the freedom that task space leaves: ``nearest``, ``posture`` or ``clear``.
         posture: Joint angles [rad] to which ``posture`` pulls; the arm's comfortable ones if empty.
         rotation: ``quat`` or ``rot6d``, as in the dataset that the policy was trained on.
         arm: Name of the arm.
@@ -93,7 +93,7 @@ class ErIlEnvConfig(EnvConfig):
 
     @property
     def space(self) -> ArmSpace:
-        """The action space that decodes."""
+        """The action space that a policy has to be trained for."""
         return self.decoder.space_of(Arm.preset(self.arm), self.rotation)
 
     @property
@@ -116,7 +116,7 @@ class ErIlEnvConfig(EnvConfig):
             command = [name for name in sys.modules if name.startswith("lerobot.scripts.")]
             get_context("forkserver").set_forkserver_preload([*command, __name__])
             vector = ProcessesEnv(factories, context="forkserver", autoreset_mode=AutoresetMode.NEXT_STEP)
-        elif n_envs >= BATCH_FROM:
+        elif n_envs >= BATCH_FROM and self.resolution != CLEAR:  # which decodes for each environment's own world
             vector = BatchDecodingEnv(factories)
         else:
             vector = SideBySideEnv(factories, autoreset_mode=AutoresetMode.NEXT_STEP)

@@ -90,6 +90,19 @@ class LearnableEnv(ArmEnv, Protocol):
         ...
 
 
+@runtime_checkable
+class ClearanceEnv(ArmEnv, Protocol):
+    """An arm environment that tells how far the arm would be from the world: what no robot knows."""
+
+    def clearances(self, q: Vector, most: float) -> Vector:
+        """Distances (L,) [m] between links and the world as it is now, were the arm at q (n,) [rad].
+
+        The links are those whose place the pose of the hand leaves open, the world everything but the robot and what
+        the task has it touch. Distances are at most ``most`` [m], and negative where shapes overlap.
+        """
+        ...
+
+
 def arm_env(env: gymnasium.Env[Any, Any]) -> ArmEnv:
     """The arm environment under an environment's wrappers.
 
@@ -115,6 +128,15 @@ def learnable_env(env: gymnasium.Env[Any, Any]) -> LearnableEnv:
         ErIlError: it is none.
     """
     return _inner(env, LearnableEnv, "environment for reinforcement learning")
+
+
+def clearance_env(env: gymnasium.Env[Any, Any]) -> ClearanceEnv:
+    """The arm environment under an environment's wrappers, with its arm's distances to the world.
+
+    Raises:
+        ErIlError: it is none, or does not tell them.
+    """
+    return _inner(env, ClearanceEnv, "environment for task-clear, which needs the arm's true distances to the world")
 
 
 def _inner[T: ArmEnv](env: gymnasium.Env[Any, Any], protocol: type[T], what: str) -> T:

@@ -121,6 +121,9 @@ def make_action_space_env(
         rotation: ``quat`` or ``rot6d``.
         on_invalid: See :class:`er_il.control.commander.Commander`.
         kwargs: Passed on to ``gymnasium.make``.
+
+    Raises:
+        ErIlError: it is no arm environment, or does not tell what the decoder needs.
     """
     env = gymnasium.make(task_id(task), **kwargs)
-    return ActionSpaceEnv(env, decoder.space_of(arm_env(env).arm, rotation), on_invalid)
+    return ActionSpaceEnv(env, decoder.space_in(env, rotation), on_invalid)

@@ -27,7 +27,7 @@ def record_rollout(
     Args:
         policy: Folder of the pretrained policy.
         task: Name of the task.
-        decoder_name: ``joint``, ``task-nearest``, ``task-posture``, ``erj``, ``era``.
+        decoder_name: ``joint``, ``task-nearest``, ``task-posture``, ``task-clear``, ``erj``, ``era``.
         seed: Seed of the initial state.
         film_every: Take a picture each so many control steps, and one at the end; 0: none.
     """

@@ -6,10 +6,12 @@ fails, the encoding has lost something that the task needs.
 
 from collections import Counter
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import gymnasium
 import numpy as np
 import pandas as pd
 
@@ -87,7 +89,7 @@ class ReplayCell:
 
 
 def replay(datasets: Sequence[Path], workers: int, advance: Callable[[Path, str, int, int], None]) -> list[ReplayCell]:
-    """Execute every demo of every dataset through each decoder that reads the dataset's space.
+    """Execute every demo of every dataset through each decoder that reads the dataset's space and works in its world.
 
     Args:
         datasets: Folders of datasets.
@@ -165,7 +167,8 @@ def _plays(dataset: Path) -> list[_Play]:
     space = arm_space_from_spec(spec)  # refuses what this version would decode differently
     name = name_of(space, Arm.preset(recipe.arm))
     rotation = spec.get("rotation", Quaternion.kind)
-    readers = [key for key, each in DECODERS.items() if each.space == name] or [name]
+    with closing(gymnasium.make(task_id(recipe.task), **recipe.replaced(cameras=()).environment)) as env:
+        readers = [key for key, each in DECODERS.items() if each.space == name and each.works_in(env)] or [name]
     return [_Play(recipe, reader, rotation) for reader in readers]
 
 

@@ -42,6 +42,7 @@ LOOKS = {
     "era": Look("ERA", PURPLE),
     "task-nearest": Look("Task (nearest)", ORANGE),
     "task-posture": Look("Task (posture)", RED),
+    "task-clear": Look("Task (clear)", BLUE),
     "task-mean": Look("Task (mean posture)", YELLOW),
     "task-grasp": Look("Task (grasp posture)", GREY),
 }

@@ -21,6 +21,7 @@ from sim_tasks.tasks.registration import Demonstrator, leader_class, registratio
 from sim_tasks.tasks.rewards import Reward, total
 from sim_tasks.tasks.targets import JointTargets
 from sim_tasks.world.camera import PICTURE, Cameras
+from sim_tasks.world.clearance import Clearance
 from sim_tasks.world.contact import contact_force
 from sim_tasks.world.geometry import world_shapes
 from sim_tasks.world.randomisation import span
@@ -191,6 +192,11 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
         return False
 
     @property
+    def touched(self) -> tuple[str, ...]:
+        """Bodies that the task has the robot touch, from which its links need not keep clear."""
+        return ()
+
+    @property
     def gripper_opening(self) -> float:
         """The gripper's true opening in [0, 1]."""
         return self.robot.opening(self.data)
@@ -203,6 +209,14 @@ class ArmTask(gym.Env[dict[str, Any], np.ndarray], ABC):
     def object_pose(self, name: str) -> np.ndarray:
         """An object's position [m] and quaternion (x, y, z, w) in the base frame, (7,)."""
         return object_pose(self.data, name)
+
+    def clearances(self, q: Vector, most: float) -> Vector:
+        """Distances (L,) [m] of the links to the world, were the arm at q (n,) [rad]; see :class:`Clearance`."""
+        return self._clearance.distances(self.data, q, most)
+
+    @cached_property
+    def _clearance(self) -> Clearance:
+        return Clearance(self.model, self.robot, {self.model.body(name).id for name in self.touched})
 
     def scene_geometry(self) -> list[Shape]:
         """The world around the robot as shapes to draw, as of the last reset."""

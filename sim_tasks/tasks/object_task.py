@@ -81,6 +81,10 @@ class ObjectTask(ArmTask):
         return spec
 
     @property
+    def touched(self) -> tuple[str, ...]:
+        return self.graspable
+
+    @property
     def tip(self) -> Vector:
         """The point between the fingertips in the base frame (3,) [m]."""
         return self.data.xpos[self._tip]

@@ -39,6 +39,10 @@ class PickTask(ArmTask):
         """Height z [m] of the surface on which the objects stand before this arm."""
 
     @property
+    def touched(self) -> tuple[str, ...]:
+        return (self.target,)
+
+    @property
     def grasp_point(self) -> Vector:
         """The point of the target at which it is to be grasped, in the base frame (3,) [m]."""
         body = self.data.body(self.target)

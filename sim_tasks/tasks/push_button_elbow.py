@@ -53,6 +53,10 @@ class PushButtonElbow(ArmTask):
         self._pedestal = int(self.model.body(PEDESTAL).mocapid[0])
 
     @property
+    def touched(self) -> tuple[str, ...]:
+        return (BUTTON,)
+
+    @property
     def travel(self) -> float:
         """Distance [m] by which the button is pressed down."""
         return -float(self.data.joint(BUTTON).qpos[0])

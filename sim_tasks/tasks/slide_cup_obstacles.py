@@ -80,6 +80,10 @@ class SlideCupObstacles(ObjectTask):
             self._put(name, (x, y, self.furniture.height + 0.0005))
 
     @property
+    def touched(self) -> tuple[str, ...]:
+        return (CUP,)
+
+    @property
     def push_point(self) -> Vector:
         """Where the tip of the hand pushes (3,) [m]: at the cup's right side, the mark being to its left."""
         x, y = self.position(CUP)[:2]

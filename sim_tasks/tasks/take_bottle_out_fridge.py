@@ -103,6 +103,10 @@ class TakeBottleOutFridge(ObjectTask):
         self.data.joint(DOOR).qpos = free
 
     @property
+    def touched(self) -> tuple[str, ...]:
+        return (*super().touched, DOOR)
+
+    @property
     def door_angle(self) -> float:
         """Opening [rad] of the door; 0 is shut."""
         return float(self.data.joint(DOOR).qpos[0])

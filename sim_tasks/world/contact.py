@@ -29,9 +29,12 @@ def collision_geoms(model: mujoco.MjModel, bodies: Collection[int]) -> tuple[int
     return tuple(np.flatnonzero(collides & np.isin(model.geom_bodyid, list(bodies))).tolist())
 
 
-def distance(model: mujoco.MjModel, data: mujoco.MjData, one: Collection[int], other: Collection[int]) -> float:
-    """Smallest distance [m] between two groups of shapes, at most FAR, negative if they overlap."""
-    return min(mujoco.mj_geomDistance(model, data, a, b, FAR, None) for a, b in product(one, other))
+def distance(
+    model: mujoco.MjModel, data: mujoco.MjData, one: Collection[int], other: Collection[int], most: float = FAR
+) -> float:
+    """Smallest distance [m] between two groups of shapes, at most ``most``, negative if they overlap."""
+    pairs = product(one, other)
+    return min((mujoco.mj_geomDistance(model, data, a, b, most, None) for a, b in pairs), default=most)
 
 
 def _between(model: mujoco.MjModel, data: mujoco.MjData, one: Collection[int], other: Collection[int]) -> Iterator[int]:

@@ -59,7 +59,7 @@ class RobotModel:
             finger_qpos=np.array([model.joint(finger).qposadr[0] for finger in FINGERS]),
             actuators=np.array([model.actuator(joint).id for joint in arm.joints]),
             gripper=model.actuator(GRIPPER).id,
-            bodies=frozenset(b for b in range(model.nbody) if _descends(model, b, root)),
+            bodies=frozenset(b for b in range(model.nbody) if descends(model, b, root)),
         )
 
     def place(self, data: mujoco.MjData, q: np.ndarray, opening: float) -> None:
@@ -155,7 +155,8 @@ def _mujoco_urdf(arm: Arm) -> str:
     return ET.tostring(root, encoding="unicode")
 
 
-def _descends(model: mujoco.MjModel, body: int, root: int) -> bool:
+def descends(model: mujoco.MjModel, body: int, root: int) -> bool:
+    """True if a body is another one, or is carried by it."""
     while body and body != root:
         body = int(model.body_parentid[body])
     return body == root

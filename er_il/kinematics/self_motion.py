@@ -1,0 +1,68 @@
+"""Self-motion: the configurations of a redundant arm that leave its end effector where it is."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from er_il.arms.arm import POSE_DOF, Vector
+from er_il.kinematics.forward import ForwardKinematics
+
+Array = NDArray[np.float64]
+
+CORRECTIONS = 2  # Newton's steps back to the pose after each step along the tangent
+OFF = 1e-3  # [m and rad] a walk that is still so far from the pose has come to the end of what is reachable
+LEAST = 1e-9  # [1] keeps the square of a Jacobian invertible
+
+
+def tangents(J: Array) -> Array:
+    """Directions (k, n), of unit length, from a configuration along its self-motion, both ways.
+
+    Of a self-motion of one dimension there are two; of more, two along each of its axes. The axes depend on the null
+    space alone, not on the basis that a decomposition finds for it, whose signs may differ from machine to machine.
+
+    Args:
+        J: (6, n) the end effector's Jacobian.
+    """
+    P, axes = np.array([_projected(J, column) for column in np.eye(J.shape[1])]), []
+    for _ in range(J.shape[1] - POSE_DOF):
+        axis = P[np.argmax(np.diag(P))]  # of the joint that the null space turns most
+        axes.append(axis / np.linalg.norm(axis))
+        P = P - np.outer(P @ axes[-1], axes[-1])
+    return np.array([sign * axis for axis in axes for sign in (1.0, -1.0)]).reshape(-1, J.shape[1])
+
+
+def walk(kinematics: ForwardKinematics, T_base_ee: Array, q: Vector, tangent: Vector, step: float) -> Iterator[Vector]:
+    """Walk along the self-motion, until a joint comes to its limit or the self-motion ends in a singularity.
+
+    Args:
+        kinematics: The arm's.
+        T_base_ee: (4, 4) pose of the end effector, which it keeps.
+        q: (n,) [rad] the start, at that pose.
+        tangent: (n,) unit direction at the start; the walk goes on straight ahead.
+        step: Length [rad] of a step, over all joints.
+
+    Yields:
+        Joint angles (n,) [rad] every ``step`` along the walk, the start left out.
+    """
+    arm = kinematics.arm
+    while True:
+        q = q + step * tangent
+        for _ in range(CORRECTIONS):
+            q = q + _least_change(kinematics.jacobian(q), kinematics.pose_gap(T_base_ee, q))
+        gap = kinematics.pose_gap(T_base_ee, q)
+        if np.any((q < arm.lower) | (q > arm.upper)) or gap @ gap > OFF**2:
+            return
+        yield q
+        ahead = _projected(kinematics.jacobian(q), tangent)
+        tangent = ahead / np.linalg.norm(ahead)
+
+
+def _projected(J: Array, change: Vector) -> Vector:
+    """A change (n,) of the joints without its part that moves the end effector."""
+    return change - _least_change(J, J @ change)
+
+
+def _least_change(J: Array, motion: Vector) -> Vector:
+    """The smallest change (n,) of the joints that moves the end effector by ``motion`` (6,) [m and rad]."""
+    return J.T @ np.linalg.solve(J @ J.T + LEAST * np.eye(POSE_DOF), motion)
