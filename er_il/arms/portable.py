@@ -14,7 +14,7 @@ _DYNAMICS = ("inertial", "transmission", "gazebo", "material")
 
 def arm_spec(arm: Arm) -> dict[str, Any]:
     """Describe what :meth:`er_il.spaces.ActionSpace.spec` leaves out of an arm; nothing for a preset."""
-    if arm.name in PRESETS and arm is Arm.preset(arm.name):
+    if arm.name in PRESETS and arm is Arm.preset(arm.name).weighing(arm.weights):
         return {}
     frames = None if arm.angle_frames is None else asdict(arm.angle_frames)
     return {"xml": _kinematic_text(arm.model_xml), "home": arm.home.tolist(), "angle_frames": frames}
