@@ -47,7 +47,7 @@ class Arm:
     upper: Vector  # (n,) [rad]
     velocity: Vector  # (n,) [rad/s]
     redundant: tuple[str, ...] = ()  # the n-6 joints that ERJ commands
-    weights: Weights = ()  # W (n-6, n) of ERX's coordinates W q, rows orthonormal; fitted to the workspace if empty
+    weights: Weights = ()  # W (n-6, n) of ERX's coordinates W q, rows orthonormal; fitted around home if empty
     home: Vector = field(default_factory=lambda: np.zeros(0))  # (n,) [rad] a comfortable posture
     angle_frames: ArmAngleFrames | None = None
 

@@ -14,7 +14,7 @@ from er_il.spaces.base import ArmSpace
 from er_il.spaces.carried import CARRIED, CarriedDeltaSpace
 from er_il.spaces.delta import PREFIX, DeltaBounds, DeltaSpace
 from er_il.spaces.joint import JOINT, JointSpace
-from er_il.spaces.margin import workspace_weights
+from er_il.spaces.margin import home_weights
 from er_il.spaces.pose import TASK, PoseSpace
 from er_il.spaces.spec import SPEC_VERSION
 from er_il.spaces.spec_types import check_types
@@ -32,7 +32,7 @@ def _arm_angle(arm: Arm) -> Redundancy:
 
 
 def _linear_coordinates(arm: Arm) -> Redundancy:
-    return LinearCoordinates(arm, arm.weights or workspace_weights(arm))
+    return LinearCoordinates(arm, arm.weights or home_weights(arm))
 
 
 ERJ, ERA, ERX = "erj", "era", "erx"
