@@ -85,7 +85,7 @@ def joints(study: OmitArgPrefixes[StudyOptions], *, training: Path | None = None
 
 
 def validity(study: OmitArgPrefixes[StudyOptions], *, samples: int = 150) -> None:
-    """Which actions are invalid, and why? Delta and absolute actions of growing size in task, ERJ and ERA.
+    """Which actions are invalid, and why? Delta and absolute actions of growing size in task, ERJ, ERA and ERX.
 
     Args:
         study: Demonstrations and results.
