@@ -136,8 +136,13 @@ def _mean_loss(weights: Vector, bases: Array, exponent: float) -> tuple[float, V
 
 
 def _rounded(W: Array) -> Weights:
-    """The same coordinates by rows that are unique: triangular in the joints that weigh most, these positive."""
+    """The same coordinates by rows that are unique: triangular in the joints that weigh most.
+
+    The first joint that weighs at least half as much as a row's largest is positive, so that similar rows look alike.
+    """
     _, R, order = qr(W, mode="economic", pivoting=True)  # pyright: ignore[reportAssignmentType]
     rows = np.empty_like(W)
-    rows[:, order] = R * np.sign(np.diag(R))[:, None]
+    rows[:, order] = R
+    first = (np.abs(rows) >= 0.5 * np.abs(rows).max(axis=1, keepdims=True)).argmax(axis=1, keepdims=True)
+    rows *= np.sign(np.take_along_axis(rows, first, axis=1))
     return tuple(tuple((row + 0.0).tolist()) for row in rows.round(DECIMALS))
