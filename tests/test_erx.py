@@ -99,6 +99,9 @@ def test_a_specification_brings_the_weights_back(kind: str, tmp_path: Path) -> N
         assert again.spec() == spec and ("xml" in spec["arm"]) == (arm.name == "chain7")
         q = arm.home + 0.1
         np.testing.assert_array_equal(again.parts[0].space.encode(q), space.encode(q))
+    other = Arm.from_urdf(PANDA.urdf, ee_frame="panda_link8", joints=PANDA.joints, name="panda")
+    for arm in (other, other.weighing([FIRST])):  # a preset by its name only
+        assert "xml" in Layout.of_space(make_arm_space(kind, arm)).spec()["arm"]
     assert name_of(make_arm_space(kind, arms[0]), PANDA8) == f"{kind}@{erx_name(arms[0].weights)[4:]}"
     assert name_of(make_arm_space(kind, PANDA), PANDA) == kind
     named = make_arm_space(name_of(make_arm_space(kind, arms[0]), PANDA8), PANDA8)

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from foreign import ARMS, write_bimanual
+from documented import documented
+from foreign import ARMS, write_bimanual, write_swing
 from lerobot.datasets import LeRobotDatasetMetadata
 from lerobot.datasets.aggregate import aggregate_datasets
 
@@ -23,6 +24,7 @@ from er_il.spaces.margin import demonstrated_weights
 from er_il.spaces.registry import erx_name, make_arm_space
 from er_il.support.errors import PolicyError
 
+PAGE = "docs/choosing.md"
 PANDA = Arm.preset("panda")
 FIRST = (tuple(np.eye(7)[0].tolist()),)
 GRID = {
@@ -70,17 +72,18 @@ def test_weights_are_fitted_to_a_dataset_which_is_encoded_with_them(
     capsys: pytest.CaptureFixture[str],
     one_worker: None,
 ) -> None:
-    out, weights, told = tmp_path / "erx", tmp_path / "weights.json", tmp_path / "advice.json"
-    options = ("--weights", weights, "--json", told, "--plot", tmp_path / "w.png", "--episodes", 1)
-    er_il(monkeypatch, "advise", reach_cup / "joint", "--fit", "erx", *options)
+    monkeypatch.chdir(tmp_path)
+    write_swing(tmp_path / "my_robot", [f"{joint}.pos" for joint in PANDA.joints])
+    out, told = tmp_path / "my_robot_erx", tmp_path / "advice.json"
+    er_il(monkeypatch, *documented(PAGE, "er-il advise my_robot --arm panda --units deg --fit"), "--json", told)
     said = " ".join(capsys.readouterr().out.split())
     rows = {row["space"]: row for row in json.loads(told.read_text())["margins"]}
     fitted = rows["erx (fitted)"]
     assert fitted["smallest"] > max(row["smallest"] for name, row in rows.items() if name != "erx (fitted)")
     assert f"at least {fitted['smallest']:.2f} (episode {fitted['episode']}, step {fitted['step']})" in said
     assert fitted["risk"] <= min(row["risk"] for row in rows.values())
-    assert (tmp_path / "w.png").read_bytes().startswith(b"\x89PNG")
-    er_il(monkeypatch, "encode", reach_cup / "joint", "--to", "erx", "--weights", weights, "--out", out)
+    assert (tmp_path / "outputs/weights.png").read_bytes().startswith(b"\x89PNG")
+    er_il(monkeypatch, *documented(PAGE, "er-il encode my_robot --arm panda --units deg --to erx"))
     assert erx_name(weights_of(out)) == fitted["name"]
     assert Dataset(out).names("action")[-2:] == ("self_motion", "gripper")
     er_il(monkeypatch, "verify", out, "--out", tmp_path / "report")
@@ -88,6 +91,11 @@ def test_weights_are_fitted_to_a_dataset_which_is_encoded_with_them(
     assert report["arms"]["panda"]["joint_error"]["p100"] < 1e-3
     er_il(monkeypatch, "encode", out, "--to", "delta_erx", "--out", tmp_path / "delta")  # it keeps its weights
     assert weights_of(tmp_path / "delta") == weights_of(out)
+    fitted_here = tmp_path / "datasets/reach_cup_fitted"
+    fitted_here.mkdir(parents=True)
+    (fitted_here / "joint").symlink_to(reach_cup / "joint")
+    er_il(monkeypatch, *documented(PAGE, "er-il generate reach_cup --spaces erx"), "--episodes", 3)
+    assert weights_of(fitted_here / "erx") == weights_of(out)
 
 
 def test_two_arms_have_weights_of_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
