@@ -41,7 +41,7 @@ def test_a_dataset_is_advised_for_its_demonstrations_then_encoded(advise, tmp_pa
     assert "of the steps of my_robot" in said
     assert "redundancy lies among the joints that twist" in said
     assert Path("outputs/advice.png").read_bytes()[:4] == b"\x89PNG"
-    run("er-il", *documented("docs/choosing.md", "er-il encode my_robot"))
+    run("er-il", *documented("docs/choosing.md", "er-il encode my_robot --to erj"))
     run("er-il", *documented("docs/choosing.md", "er-il verify my_robot_erj"))
     verified = json.loads(Path("outputs/my_robot_erj/report.json").read_text())
     assert verified["arms"]["panda"]["joint_error"]["p100"] < 1e-3

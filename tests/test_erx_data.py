@@ -24,7 +24,6 @@ from er_il.spaces.margin import demonstrated_weights
 from er_il.spaces.registry import erx_name, make_arm_space
 from er_il.support.errors import PolicyError
 
-PAGE = "docs/choosing.md"
 PANDA = Arm.preset("panda")
 FIRST = (tuple(np.eye(7)[0].tolist()),)
 GRID = {
@@ -54,7 +53,8 @@ def mistake(patch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], *argu
 
 
 def weights_of(dataset: Path) -> tuple[tuple[float, ...], ...]:
-    return tuple(map(tuple, Dataset(dataset).spec["linear_coordinates"]["weights"]))
+    (arm,) = Dataset(dataset).layout.arms.values()
+    return arm.weights
 
 
 @pytest.fixture
@@ -75,7 +75,12 @@ def test_weights_are_fitted_to_a_dataset_which_is_encoded_with_them(
     monkeypatch.chdir(tmp_path)
     write_swing(tmp_path / "my_robot", [f"{joint}.pos" for joint in PANDA.joints])
     out, told = tmp_path / "my_robot_erx", tmp_path / "advice.json"
-    er_il(monkeypatch, *documented(PAGE, "er-il advise my_robot --arm panda --units deg --fit"), "--json", told)
+    er_il(
+        monkeypatch,
+        *documented("docs/choosing.md", "er-il advise my_robot --arm panda --units deg --fit"),
+        "--json",
+        told,
+    )
     said = " ".join(capsys.readouterr().out.split())
     rows = {row["space"]: row for row in json.loads(told.read_text())["margins"]}
     fitted = rows["erx (fitted)"]
@@ -83,7 +88,7 @@ def test_weights_are_fitted_to_a_dataset_which_is_encoded_with_them(
     assert f"at least {fitted['smallest']:.2f} (episode {fitted['episode']}, step {fitted['step']})" in said
     assert fitted["risk"] <= min(row["risk"] for row in rows.values())
     assert (tmp_path / "outputs/weights.png").read_bytes().startswith(b"\x89PNG")
-    er_il(monkeypatch, *documented(PAGE, "er-il encode my_robot --arm panda --units deg --to erx"))
+    er_il(monkeypatch, *documented("docs/choosing.md", "er-il encode my_robot --arm panda --units deg --to erx"))
     assert erx_name(weights_of(out)) == fitted["name"]
     assert Dataset(out).names("action")[-2:] == ("self_motion", "gripper")
     er_il(monkeypatch, "verify", out, "--out", tmp_path / "report")
@@ -94,7 +99,7 @@ def test_weights_are_fitted_to_a_dataset_which_is_encoded_with_them(
     fitted_here = tmp_path / "datasets/reach_cup_fitted"
     fitted_here.mkdir(parents=True)
     (fitted_here / "joint").symlink_to(reach_cup / "joint")
-    er_il(monkeypatch, *documented(PAGE, "er-il generate reach_cup --spaces erx"), "--episodes", 3)
+    er_il(monkeypatch, *documented("docs/choosing.md", "er-il generate reach_cup --spaces erx"), "--episodes", 3)
     assert weights_of(fitted_here / "erx") == weights_of(out)
 
 

@@ -218,10 +218,9 @@ def test_the_studies_run_on_recorded_demonstrations(tmp_path, monkeypatch, capsy
     assert report["meta"]["demos"] == {"reach_cup": 1}
     run(monkeypatch, *documented("docs/choosing.md", "er-il study margins"), "--episodes", 1, "--out", "margins")
     margins = {row["space"]: row for row in json.loads(Path("margins/report.json").read_text())["margins"]}
-    assert margins["erx (fitted)"]["smallest"] > max(
-        margins[name]["smallest"] for name in ("erx", "panda_joint1", "era")
-    )
-    assert margins["panda_joint4"]["folds"] > 0 == margins["erx (fitted)"]["folds"]
+    fitted = margins.pop("erx (fitted)")
+    assert fitted["smallest"] > max(row["smallest"] for row in margins.values())
+    assert margins["panda_joint4"]["folds"] > 0 == fitted["folds"]
     for picture in ("joints/joints.png", "validity/validity.png", "margins/margins.png"):
         assert (tmp_path / picture).read_bytes()[:4] == b"\x89PNG"
 

@@ -60,8 +60,7 @@ class Training:
         kind, choice = split_name(self.space)
         if spec["space"] != kind:
             raise DatasetError(f"The dataset at {self.dataset} holds {spec['space']} actions, not {kind}.")
-        commanded = Contract.of_spec(spec).redundant
-        if choice and commanded != AND.join(choice):
+        if choice and (commanded := Contract.of_spec(spec).redundant) != AND.join(choice):
             raise DatasetError(f"The dataset at {self.dataset} commands {commanded}, not {AND.join(choice)}.")
 
     @property
