@@ -91,6 +91,8 @@ def test_weights_are_fitted_to_a_dataset_which_is_encoded_with_them(
     er_il(monkeypatch, *documented("docs/choosing.md", "er-il encode my_robot --arm panda --units deg --to erx"))
     assert erx_name(weights_of(out)) == fitted["name"]
     assert Dataset(out).names("action")[-2:] == ("self_motion", "gripper")
+    first, *_ = weights_of(out)[0]
+    assert f"| self-motion {first:.2f} panda_joint1 - " in (out / "README.md").read_text()
     er_il(monkeypatch, "verify", out, "--out", tmp_path / "report")
     report = json.loads((tmp_path / "report/report.json").read_text())
     assert report["arms"]["panda"]["joint_error"]["p100"] < 1e-3

@@ -78,7 +78,7 @@ def advise(
             )
     for label, report in reports.items():
         rows = texts(report)
-        console.print(terminal_table(rows[:ROWS]))
+        console.print(terminal_table(rows.head(ROWS)))
         if (more := len(rows) - ROWS) > 0:
             console.print(f"and {more} more, with --json", highlight=False)
         for note in report["notes"]:

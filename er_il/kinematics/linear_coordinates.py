@@ -17,6 +17,7 @@ from er_il.kinematics.redundancy import Array, LinearRedundancy
 from er_il.support.errors import ArmError, SpecError
 
 NAME = "self_motion"
+TINY = 0.005  # weights below this are not told to people
 SPEC_KEY = "linear_coordinates"  # of a specification
 
 
@@ -38,6 +39,16 @@ class LinearCoordinates(LinearRedundancy):
     @cached_property
     def weights(self) -> Array:
         return np.array(self.rows)
+
+    def formula(self, name: str) -> str:
+        """A coordinate as a sum of joints, for people: ``0.74 joint1 - 0.43 joint3``, tiny weights left out."""
+        weighed = zip(self.rows[self.names.index(name)], self.arm.joints, strict=True)
+        terms = [
+            f"{'-' if weight < 0 else '+'} {abs(weight):.2f} {joint}"
+            for weight, joint in weighed
+            if abs(weight) >= TINY
+        ]
+        return " ".join(terms).removeprefix("+ ")
 
     def details(self) -> dict[str, Any]:
         return {SPEC_KEY: {"joints": list(self.arm.joints), "weights": [list(row) for row in self.rows]}}
