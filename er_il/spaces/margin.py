@@ -33,6 +33,7 @@ AROUND = 0.8  # [rad] of each joint from home, as far as its limits let it: wher
 SAMPLES, SAMPLES_SEED = 1000, 0  # configurations around home
 DECIMALS = 4  # of the weights: similar data shall have the same, and a name shall hold them
 EXPONENTS = (0.0, 4.0, 16.0, 64.0)  # of the generalised mean along demonstrations, one after the other
+STARTS = 5  # of the search for the mean's maximum: the best of the joints, and what sees most of the self-motion
 TRIES = 20  # at most, until no episode changes its sign
 SUBSET = 200  # self-motions with which the convex problem begins; those that it violates join
 SLACK = 1e-9
@@ -109,8 +110,11 @@ def _best_mean(bases: Array, exponent: float) -> Array:
     m, n = bases.shape[1:]
     main = np.linalg.eigh(np.einsum("kmi,kmj->ij", bases, bases))[1][:, -m:].T  # sees most of the self-motion's square
     starts = [main, *(np.eye(n)[list(joints)] for joints in itertools.combinations(range(n), m))]
-    found = [_improved(bases, start, exponent) for start in starts]
-    return min(found, key=lambda W: _mean_loss(W.ravel(), bases, exponent)[0])
+
+    def loss(W: Array) -> float:
+        return _mean_loss(W.ravel(), bases, exponent)[0]
+
+    return min((_improved(bases, start, exponent) for start in sorted(starts, key=loss)[:STARTS]), key=loss)
 
 
 def _improved(bases: Array, W: Array, exponent: float) -> Array:
