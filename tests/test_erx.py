@@ -10,10 +10,13 @@ from chains import chain_arm
 from scipy.optimize import nnls
 
 from er_il import Arm, Status, from_spec, make_action_space
+from er_il.datasets.joint_paths import JointPath
+from er_il.experiments.studies.margins import study_margins
 from er_il.kinematics.linear_coordinates import LinearCoordinates
 from er_il.kinematics.redundancy import JointAngle
 from er_il.kinematics.self_motion import margins, self_motions
 from er_il.kinematics.solver import kinematics_of
+from er_il.report.margins import margins_figure
 from er_il.spaces import margin
 from er_il.spaces.demo_margins import margins_along, motion_measured
 from er_il.spaces.layout import Layout
@@ -197,6 +200,22 @@ def test_fitted_coordinates_are_farther_from_folds_than_any_joint(arm: Arm) -> N
     assert space.redundancy is not None
     seen = margins(space.redundancy, demos[fitted.demo])
     assert seen[fitted.step] == seen.min() == fitted.smallest
+
+
+def test_a_study_tells_the_demonstrations_from_the_arm_whatever_their_names() -> None:
+    q = path(PANDA, 0.3, 12)
+    report = study_margins(PANDA, {"erx": [JointPath(7, q, q)]}, 1, lambda done, total: None)
+    rows = {row["space"]: row for row in json.loads(json.dumps(report))["margins"]}
+    assert rows["erx (fitted)"]["smallest"] >= rows["erx"]["smallest"] > rows["panda_joint4"]["smallest"]
+    assert {row["episode"] for row in rows.values()} == {7}
+    own, fitted = report["coordinates"]
+    assert (own["demos"], fitted["demos"]) == (None, "erx")
+    assert (
+        erx_name(own["weights"]) == rows["erx"]["name"] and erx_name(fitted["weights"]) == rows["erx (fitted)"]["name"]
+    )
+    assert report["notes"][0].startswith("Along erx the margin of ERX fitted to it is at least ")
+    assert [note.split(":")[0] for note in report["notes"][1:]] == ["Weights of the arm", "Weights fitted to erx"]
+    assert len(margins_figure(report).axes) == 2
 
 
 @pytest.mark.parametrize("name", ["panda", "panda8"])

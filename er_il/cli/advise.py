@@ -96,7 +96,7 @@ def _write_weights(path: Path, found: "dict[str, tuple[Arm, Demos]]", reports: "
     """Write the weights that were fitted to each arm's demonstrations."""
     from er_il.datasets.weights import ArmWeights, WeightsFile
 
-    fitted = {label: report["weights"][next(iter(found[label][1]))] for label, report in reports.items()}
+    fitted = {label: report["coordinates"][-1]["weights"] for label, report in reports.items()}
     arms = {label: ArmWeights.of(arm, fitted[label]) for label, (arm, _) in found.items()}
     WeightsFile(arms=arms).write(path)
 

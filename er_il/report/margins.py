@@ -49,23 +49,23 @@ def margins_table(report: Report) -> str:
 @styled
 def margins_figure(report: Report) -> Figure:
     """The smallest margin of each space along each set of demonstrations, and ERX's weights joint by joint."""
-    count = len(next(iter(report["weights"].values())))
+    count = len(report["coordinates"][0]["weights"])
     figure = Figure(figsize=(9.0, 3.0 + 2.4 * count))
     axes = figure.subplots(1 + count, 1)
-    names = list(report["weights"])
-    looks = {name: Look(name, colour) for name, colour in zip(names, (GREY, BLUE, *OTHERS * len(names)), strict=False)}
+    sets = list(by_demos(report))
+    looks = {name: Look(name, colour) for name, colour in zip(sets, (BLUE, *OTHERS * len(sets)), strict=False)}
     smallest = pd.DataFrame(report["margins"]).rename(columns={"space": "group", "demos": "series"})
     axis = axes[0]
-    bar_chart(axis, smallest.assign(value=smallest["smallest"]), {name: looks[name] for name in names[1:]})
+    bar_chart(axis, smallest.assign(value=smallest["smallest"]), looks)
     axis.set(ylabel="Smallest margin", ylim=(0.0, 1.0), title="Margin from folds along the demonstrations")
     axis.tick_params("x", rotation=20)
     for row, axis in enumerate(axes[1:]):
         weights = [
-            {"series": name, "group": joint, "value": each[row][i]}
-            for name, each in report["weights"].items()
-            for i, joint in enumerate(report["joints"])
+            {"series": each["demos"], "group": joint, "value": weight}
+            for each in report["coordinates"]
+            for joint, weight in zip(report["joints"], each["weights"][row], strict=True)
         ]
-        bar_chart(axis, pd.DataFrame(weights), looks)
+        bar_chart(axis, pd.DataFrame(weights).fillna({"series": ""}), {"": Look("no demonstrations", GREY)} | looks)
         axis.axhline(0.0, color=INK, linewidth=0.9)
         which = "" if count == 1 else f", coordinate {row + 1}"
         axis.set(ylabel="Weight in W", title=f"What ERX measures{which}: the weight of each joint")

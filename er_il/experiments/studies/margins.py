@@ -37,13 +37,14 @@ def study_margins(arm: Arm, demos: Demos, workers: int, advance: Advance) -> dic
         for name, of_set in spaces.items()
         for label, space in of_set.items()
     ]
-    weights = {PRESET: own} | fitted
     report = {
         "arm": arm.name,
         "joints": list(arm.joints),
         "margins": rows,
-        "weights": {name: [list(row) for row in each] for name, each in weights.items()},
-        "motion": {name: motion_measured(arm, each) for name, each in weights.items()},
+        "coordinates": [
+            {"demos": name, "weights": [list(row) for row in each]} | motion_measured(arm, each)
+            for name, each in [(None, own), *fitted.items()]  # None: the arm's own
+        ],
     }
     return report | {"notes": notes(report)}
 
