@@ -95,12 +95,10 @@ def split_name(name: str) -> tuple[str, tuple[str, ...]]:
     if absolute not in SPACES or (prefix == CARRIED and absolute not in CARRIERS):
         deltas = [*(PREFIX + space for space in SPACES), *(CARRIED + space for space in CARRIERS)]
         raise UnknownNameError("action space", kind, [*SPACES, *deltas])
-    choice = tuple(said.split(AND)) if at else ()
-    try:
-        fits = all(choice) and (absolute == ERJ or (absolute == ERX and bool(_weights(choice))) or not at)
-    except ValueError:
-        fits = False
-    if not fits:
+    if not at:
+        return kind, ()
+    choice = tuple(said.split(AND))
+    if not (all(choice) and (absolute == ERJ or (absolute == ERX and _weights(choice)))):
         raise UnknownNameError("action space", name, [*SPACES, f"{ERJ}{AT}JOINT", f"{ERX}{AT}NUMBER{THEN}NUMBER..."])
     return kind, choice
 
@@ -116,12 +114,11 @@ def weights_text(weights: Sequence[Sequence[float]]) -> str:
 
 
 def _weights(rows: Sequence[str]) -> Weights:
-    """The weights that a name says.
-
-    Raises:
-        ValueError: they are no numbers.
-    """
-    return tuple(tuple(map(float, row.split(THEN))) for row in rows)
+    """The weights that a name says; () if they are no numbers."""
+    try:
+        return tuple(tuple(map(float, row.split(THEN))) for row in rows)
+    except ValueError:
+        return ()
 
 
 def _split_kind(kind: str) -> tuple[str, str]:
