@@ -15,26 +15,36 @@ import tyro
 from arms import REDUNDANT
 from rich.progress import Progress
 
+from er_il.spaces.base import ArmSpace
 from er_il.spaces.registry import make_arm_space
 from er_il.spaces.round_trip import CAUSES, EXACT, SINGULAR, round_trips
 from er_il.support.atomic_files import write_json
 from er_il.support.provenance import provenance
 from er_il.support.workers import cores, run_jobs
 
-SPACES = ("erj", "era")
+SPACES = ("erj", "erx", "era")
 SEED_ERRORS = (0.1, 0.03)  # [rad]
+
+
+def commanded(space: ArmSpace) -> list[str]:
+    """What a space commands beside the pose: joints, coordinates, or the link that is the elbow."""
+    frames = space.arm.angle_frames
+    if space.kind == "era":
+        return [frames.elbow] if frames else []
+    return [name.removesuffix(".pos") for name in space.names[-space.arm.redundancy :]]
 
 
 def measure(name: str, kind: str, seed_error: float, samples: int) -> dict[str, object]:
     """One row of the report."""
     arm = REDUNDANT[name]()
-    trips = round_trips(make_arm_space(kind, arm), samples, seed_error=seed_error)
+    space = make_arm_space(kind, arm)
+    trips = round_trips(space, samples, seed_error=seed_error)
     missed = [trip for trip in trips if not trip.exact]
     causes = Counter(trip.cause for trip in missed)
     return {
         "arm": name,
         "joints": arm.dof,
-        "commands": list(arm.redundant) if kind == "erj" else [arm.angle_frames.elbow if arm.angle_frames else ""],
+        "commands": commanded(space),
         "space": kind,
         "seed_error": seed_error,
         "samples": samples,
@@ -48,7 +58,7 @@ def measure(name: str, kind: str, seed_error: float, samples: int) -> dict[str, 
 def cells() -> Iterator[tuple[str, str, float]]:
     """What there is to measure: ERA describes one redundant joint only."""
     for name, build in REDUNDANT.items():
-        for kind in SPACES if build().redundancy == 1 else SPACES[:1]:
+        for kind in SPACES if build().redundancy == 1 else SPACES[:2]:
             for seed_error in SEED_ERRORS:
                 yield name, kind, seed_error
 

@@ -14,6 +14,7 @@ from typing import Any
 from er_il.envs.decoders import DECODERS
 from er_il.evaluation.results import RESULTS
 from er_il.report.joints import joints_table
+from er_il.report.margins import margins_table
 from er_il.report.tables import markdown_table
 from er_il.report.text import table
 from er_il.report.validity import validity_table
@@ -41,6 +42,8 @@ def shown(report: dict[str, Any]) -> str:
     """A report as Markdown."""
     if "workspace" in report:
         return joints_table(report)
+    if "margins" in report:
+        return margins_table(report)
     if "pooled" in report:
         return validity_table(report)
     if all("rewards" in cell for cell in report.get("cells", [{}])):  # of er-il replay

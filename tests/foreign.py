@@ -14,6 +14,7 @@ LEFT, RIGHT = Arm.preset("panda"), Arm.preset("xarm7")
 LEFT_JOINTS = tuple(f"left_joint_{i}.pos" for i in range(1, 8))
 RIGHT_JOINTS = tuple(f"right_joint_{i}.pos" for i in range(1, 8))
 SIGNS, OFFSETS = (1, -1, 1, 1, -1, 1, 1), (0, 0, 0, 90, 0, -90, 0)  # of the right arm: q = sign * motor + offset
+MOTORS = tuple(f"motor_{i}" for i in range(1, 8))
 GRIPPERS = ("left_gripper.pos", "right_gripper.pos")
 NAMES = tuple(np.random.default_rng(3).permutation([*LEFT_JOINTS, *RIGHT_JOINTS, *GRIPPERS, "lift.height"]).tolist())
 
@@ -115,3 +116,18 @@ def write_openarm(folder: Path) -> None:
     (folder / "openarm.urdf").write_text(ET.tostring(robot, encoding="unicode"))
     episodes = [{name: rows[episode] for name, rows in values.items()} for episode in range(len(LENGTHS))]
     write_dataset(folder / "demos" / "openarm", episodes, list(values), camera=True)
+
+
+def write_swing(root: Path, motors: Sequence[str] = MOTORS) -> Path:
+    """A dataset that does not know its arm: a Panda's motors in degrees, its elbow swinging about the vertical."""
+    names = [*motors, "gripper"]
+    feature = {"dtype": "float32", "shape": (8,), "names": names}
+    dataset = LeRobotDataset.create("lab/arm", 20, {"action": feature}, root=root, robot_type="arm", use_videos=False)
+    for _ in range(2):
+        for share in np.linspace(0, 2 * np.pi, 25):
+            q = LEFT.home + 0.3 * np.sin(share) * np.array([1, 0, -1, 0, 0, 0, 0])
+            frame = np.append(np.rad2deg(q), 1.0).astype(np.float32)
+            dataset.add_frame({"action": frame, "task": "swing"})
+        dataset.save_episode()
+    dataset.finalize()
+    return root

@@ -2,20 +2,17 @@
 
 import json
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
 import pytest
 from chains import write_chain
 from documented import documented, run
-from lerobot.datasets import LeRobotDataset
+from foreign import write_swing
 
 from er_il import Arm
 from er_il.cli import main
 
 PANDA = Arm.preset("panda")
-MOTORS = [f"motor_{i}" for i in range(1, 8)]
 
 
 @pytest.fixture
@@ -30,24 +27,9 @@ def advise(one_worker, monkeypatch, capsys, tmp_path):
     return advised
 
 
-def write_dataset(root: Path, motors: Sequence[str] = MOTORS) -> Path:
-    """A dataset that does not know its arm: a Panda's motors in degrees, its elbow swinging about the vertical."""
-    names = [*motors, "gripper"]
-    feature = {"dtype": "float32", "shape": (8,), "names": names}
-    dataset = LeRobotDataset.create("lab/arm", 20, {"action": feature}, root=root, robot_type="arm", use_videos=False)
-    for _ in range(2):
-        for share in np.linspace(0, 2 * np.pi, 25):
-            q = PANDA.home + 0.3 * np.sin(share) * np.array([1, 0, -1, 0, 0, 0, 0])
-            frame = np.append(np.rad2deg(q), 1.0).astype(np.float32)
-            dataset.add_frame({"action": frame, "task": "swing"})
-        dataset.save_episode()
-    dataset.finalize()
-    return root
-
-
 @pytest.mark.slow
 def test_a_dataset_is_advised_for_its_demonstrations_then_encoded(advise, tmp_path):
-    write_dataset(tmp_path / "my_robot", [f"{joint}.pos" for joint in PANDA.joints])
+    write_swing(tmp_path / "my_robot", [f"{joint}.pos" for joint in PANDA.joints])
     said = advise(*documented("docs/choosing.md", "er-il advise my_robot")[1:])
     report = json.loads(Path("outputs/advice.json").read_text())
     assert list(report["demos"]) == ["my_robot"]
@@ -59,7 +41,7 @@ def test_a_dataset_is_advised_for_its_demonstrations_then_encoded(advise, tmp_pa
     assert "of the steps of my_robot" in said
     assert "redundancy lies among the joints that twist" in said
     assert Path("outputs/advice.png").read_bytes()[:4] == b"\x89PNG"
-    run("er-il", *documented("docs/choosing.md", "er-il encode my_robot"))
+    run("er-il", *documented("docs/choosing.md", "er-il encode my_robot --to erj"))
     run("er-il", *documented("docs/choosing.md", "er-il verify my_robot_erj"))
     verified = json.loads(Path("outputs/my_robot_erj/report.json").read_text())
     assert verified["arms"]["panda"]["joint_error"]["p100"] < 1e-3
@@ -96,7 +78,7 @@ def test_the_joints_of_a_urdf_by_file_are_advised(advise, tmp_path):
 
 
 def test_a_dataset_that_does_not_know_its_arm_must_be_told(advise, capsys, tmp_path):
-    write_dataset(tmp_path / "my_robot")
+    write_swing(tmp_path / "my_robot")
     with pytest.raises(SystemExit):
         advise("my_robot")
     assert "give --arm, and --joints" in capsys.readouterr().err

@@ -13,7 +13,7 @@ from er_il.support.errors import ShapeError
 
 PANDA, XARM7, PANDA8 = Arm.preset("panda"), Arm.preset("xarm7"), Arm.preset("panda8")
 AGREES = 1e-6  # [rad]
-KINDS = ("joint", "task", "erj", "era")
+KINDS = ("joint", "task", "erj", "era", "erx")
 
 
 def sample(space: ArmSpace, count: int, reach: float, seed_error: float = 0.1) -> tuple[Array, Array, Array]:

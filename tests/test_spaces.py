@@ -138,7 +138,7 @@ def test_wrong_shapes_are_refused_with_what_was_expected():
 
 
 def test_unknown_space_names_the_valid_ones():
-    with pytest.raises(UnknownNameError, match=r"^Unknown action space 'ik'\. Valid: joint, task, erj, era, delta_"):
+    with pytest.raises(UnknownNameError, match=r"^Unknown action space 'ik'\. Valid: joint, task, erj, era, erx, "):
         make_action_space("ik", PANDA)
 
 

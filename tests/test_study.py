@@ -89,9 +89,9 @@ def test_all_spaces_get_the_same_states_and_errors_and_the_report_adds_up():
     path = JointPath(0, near_home(10), near_home(10))
     report = study_validity(PANDA, {"swing": [path]}, 1, 1, lambda done, total: told.append((done, total)))
     report = json.loads(json.dumps(report))
-    assert told[-1] == (len(report["cells"]), len(report["cells"])) == (120, 120)
-    assert len(report["pooled"]) == 24 and "size" not in report["pooled"][0]
-    assert sum(row["actions"] for row in report["pooled"]) == sum(cell["actions"] for cell in report["cells"]) == 120
+    assert told[-1] == (len(report["cells"]), len(report["cells"])) == (160, 160)
+    assert len(report["pooled"]) == 32 and "size" not in report["pooled"][0]
+    assert sum(row["actions"] for row in report["pooled"]) == sum(cell["actions"] for cell in report["cells"]) == 160
     for row in report["pooled"]:
         assert sum(row["causes"].values()) == row["invalid"]
     assert [finding.split()[0] for finding in report["findings"]] == ["Around", "Around", "Without", "Decode"]
@@ -204,19 +204,24 @@ def test_the_studies_run_on_recorded_demonstrations(tmp_path, monkeypatch, capsy
     assert report["meta"]["versions"]["placo"]
     assert "redundancy lies among the joints that twist" in capsys.readouterr().out.replace("\n", " ")
     # The demonstrations are there already: the other studies find them where they would record them.
-    for study in ("validity", "deltas"):
+    for study in ("validity", "deltas", "margins"):
         shutil.copytree("joints/demos", f"{study}/demos")
     study_validity = documented("docs/choosing.md", "er-il study validity")
     run(monkeypatch, *study_validity, "--episodes", 1, "--samples", 1, "--out", "validity")
     study_deltas = documented("docs/choosing.md", "er-il study deltas")
     run(monkeypatch, *study_deltas, "--episodes", 1, "--out", "deltas")
     drifts = {each["space"]: each for each in json.loads(Path("deltas/report.json").read_text())["drifts"]}
-    assert max(drifts[space]["joints"] for space in ("joint", "erj", "era")) < 1e-3 < drifts["task"]["joints"]
+    assert max(drifts[space]["joints"] for space in ("joint", "erj", "era", "erx")) < 1e-3 < drifts["task"]["joints"]
     assert max(each["position"] for each in drifts.values()) < 1e-4
     assert not any(each["invalid"] for each in drifts.values())
     report = json.loads((tmp_path / "validity/report.json").read_text())
     assert report["meta"]["demos"] == {"reach_cup": 1}
-    for picture in ("joints/joints.png", "validity/validity.png"):
+    run(monkeypatch, *documented("docs/choosing.md", "er-il study margins"), "--episodes", 1, "--out", "margins")
+    margins = {row["space"]: row for row in json.loads(Path("margins/report.json").read_text())["margins"]}
+    fitted = margins.pop("erx (fitted)")
+    assert fitted["smallest"] > max(row["smallest"] for row in margins.values())
+    assert margins["panda_joint4"]["folds"] > 0 == fitted["folds"]
+    for picture in ("joints/joints.png", "validity/validity.png", "margins/margins.png"):
         assert (tmp_path / picture).read_bytes()[:4] == b"\x89PNG"
 
 

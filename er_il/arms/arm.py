@@ -16,7 +16,9 @@ from er_il.arms.urdf import parse_urdf, pinocchio_model
 from er_il.support.errors import ArmError, UnknownNameError
 
 Vector = NDArray[np.float64]
+Weights = tuple[tuple[float, ...], ...]  # a matrix by its rows
 
+UNIT = 1e-3  # by which products of ERX's rows may miss those of an orthonormal basis: four decimals are enough
 POSE_DOF = 6  # an end-effector pose fixes six degrees of freedom; what an arm has beyond is redundant
 
 
@@ -45,6 +47,7 @@ class Arm:
     upper: Vector  # (n,) [rad]
     velocity: Vector  # (n,) [rad/s]
     redundant: tuple[str, ...] = ()  # the n-6 joints that ERJ commands
+    weights: Weights = ()  # W (n-6, n) of ERX's coordinates W q, rows orthonormal; fitted around home if empty
     home: Vector = field(default_factory=lambda: np.zeros(0))  # (n,) [rad] a comfortable posture
     angle_frames: ArmAngleFrames | None = None
 
@@ -170,6 +173,26 @@ class Arm:
         """
         return self if tuple(redundant) == self.redundant else _commanding(self, tuple(redundant))
 
+    def weighing(self, weights: Sequence[Sequence[float]]) -> "Arm":
+        """Return the same arm with other weights of ERX's coordinates (the same object if asked again).
+
+        Args:
+            weights: (n-6, n) orthonormal rows.
+
+        Raises:
+            ArmError: they are not.
+        """
+        rows = tuple(tuple(map(float, row)) for row in weights)
+        return self if rows == self.weights else _weighing(self, rows)
+
+    def _check_weights(self) -> None:
+        shape = f"{self.redundancy} rows of {self.dof} numbers, one for each of {', '.join(self.joints)}"
+        if len(self.weights) != self.redundancy or any(len(row) != self.dof for row in self.weights):
+            raise ArmError(f"The weights of {self.name}'s linear coordinates are not {shape}.")
+        W = np.array(self.weights).reshape(self.redundancy, self.dof)
+        if not np.all(np.abs(W @ W.T - np.eye(len(W))) < UNIT):  # NaN is not, either
+            raise ArmError(f"The weights of {self.name}'s linear coordinates are no orthonormal rows.")
+
     @property
     def dof(self) -> int:
         """Number of arm joints n."""
@@ -213,6 +236,13 @@ def _commanding(arm: Arm, redundant: tuple[str, ...]) -> Arm:
     return other
 
 
+@lru_cache
+def _weighing(arm: Arm, weights: Weights) -> Arm:
+    other = replace(arm, weights=weights)
+    other._check_weights()
+    return other
+
+
 def _frozen(values: ArrayLike) -> Vector:
     array = np.array(values, dtype=np.float64)
     array.setflags(write=False)
@@ -240,7 +270,7 @@ def _preset(name: str) -> Arm:
     if name not in PRESETS:
         raise UnknownNameError("arm", name, sorted(PRESETS))
     preset = PRESETS[name]
-    return Arm.from_urdf(
+    arm = Arm.from_urdf(
         preset.urdf(),
         name=name,
         base_frame=preset.base_frame,
@@ -248,3 +278,4 @@ def _preset(name: str) -> Arm:
         joints=preset.joints,
         home=preset.home,
     )
+    return arm.weighing(preset.weights)

@@ -14,7 +14,7 @@ _DYNAMICS = ("inertial", "transmission", "gazebo", "material")
 
 def arm_spec(arm: Arm) -> dict[str, Any]:
     """Describe what :meth:`er_il.spaces.ActionSpace.spec` leaves out of an arm; nothing for a preset."""
-    if arm.name in PRESETS and arm is Arm.preset(arm.name):
+    if arm.name in PRESETS and _is_preset(arm, Arm.preset(arm.name)):
         return {}
     frames = None if arm.angle_frames is None else asdict(arm.angle_frames)
     return {"xml": _kinematic_text(arm.model_xml), "home": arm.home.tolist(), "angle_frames": frames}
@@ -40,6 +40,11 @@ def arm_from_spec(described: Mapping[str, Any]) -> Arm:
         home=described["home"],
         angle_frames=None if frames is None else ArmAngleFrames(**frames),
     )
+
+
+def _is_preset(arm: Arm, preset: Arm) -> bool:
+    """True if an arm is a preset, with whatever weights."""
+    return bool(arm.weights) and arm.joints == preset.joints and arm is preset.weighing(arm.weights)
 
 
 def _kinematic_text(xml: str) -> str:

@@ -20,6 +20,7 @@ class Preset:
     ee_frame: str
     joints: tuple[str, ...]
     home: tuple[float, ...]  # (n,) [rad] a comfortable posture
+    weights: tuple[tuple[float, ...], ...]  # (n-6, n) of ERX: those of er_il.spaces.margin.home_weights
 
 
 PANDA_JOINTS = tuple(f"panda_joint{i}" for i in range(1, 8))
@@ -32,6 +33,7 @@ PRESETS = {
         ee_frame="panda_hand_tcp",
         joints=PANDA_JOINTS,
         home=PANDA_HOME,
+        weights=((0.7359, -0.0024, -0.4335, -0.0005, -0.3414, 0.003, 0.3923),),
     ),
     "panda8": Preset(
         panda8_urdf,
@@ -39,6 +41,10 @@ PRESETS = {
         ee_frame="panda_hand_tcp",
         joints=("panda_base_joint2", *PANDA_JOINTS),
         home=(0.0, *PANDA_HOME),
+        weights=(
+            (0.5152, 0.0013, -0.8183, -0.0065, -0.1543, 0.0048, -0.2027, -0.0022),
+            (-0.001, 0.7541, 0.0, -0.3953, 0.0001, -0.3353, 0.0026, 0.4032),
+        ),
     ),
     "xarm7": Preset(
         partial(example_robot_data, "xarm_description/urdf/xarm7.urdf"),
@@ -46,6 +52,7 @@ PRESETS = {
         ee_frame="link_eef",
         joints=tuple(f"joint{i}" for i in range(1, 8)),
         home=(0.0, -0.3, 0.0, 1.2, 0.0, 1.5, 0.0),
+        weights=((0.7872, -0.0041, -0.5484, -0.0008, -0.2143, -0.0044, 0.1835),),
     ),
     "gen3": Preset(
         gen3_urdf,
@@ -53,5 +60,6 @@ PRESETS = {
         ee_frame="end_effector_link",
         joints=tuple(f"joint_{i}" for i in range(1, 8)),
         home=(0.0, 0.26, pi, -2.27, 0.0, 0.96, pi / 2),
+        weights=((0.6961, 0.0155, -0.7061, 0.0177, -0.0303, 0.0071, 0.1237),),
     ),
 }

@@ -16,6 +16,7 @@ def encode(
     redundant: Names = (),
     angle_frames: Names = (),
     rotation: str = "quat",
+    weights: Path | None = None,
     keep: bool = True,
 ) -> None:
     """Write a LeRobot v3 dataset again with its actions in another action space.
@@ -25,20 +26,23 @@ def encode(
 
     Args:
         source: Folder of the dataset, or its repository id on the hub.
-        to: joint, task, erj or era; joint goes back through the decoder to the robot's own joint values.
+        to: joint, task, erj, era or erx; joint goes back through the decoder to the robot's own joint values.
         out: Folder of the new dataset.
         robot: The arm of a dataset that does not know it.
         redundant: Joints of the URDF that erj commands; the first ones if omitted.
         angle_frames: Shoulder, elbow and wrist link, for era; those at which seven joints bend if omitted.
         rotation: quat or rot6d.
+        weights: File of the weights of erx, which er-il advise --fit erx writes; those of the arm if omitted.
         keep: Keep the actions as they were in a column source.action, which no policy reads.
     """
     from rich.console import Console
 
     from er_il.cli.progress import make_progress
     from er_il.datasets.reencoding import reencode
+    from er_il.datasets.weights import read_weights
 
     wirings = robot.wirings(redundant, angle_frames)
+    given = read_weights(weights, (to,))
     console = Console()
     with make_progress(console) as progress:
         bar = progress.add_task(f"Encode as {to}", total=None, visible=False)  # until a frame is encoded
@@ -48,6 +52,7 @@ def encode(
             to,
             rotation=rotation,
             wirings=wirings,
+            weights=given,
             keep=keep,
             on_progress=lambda done, total: progress.update(bar, completed=done, total=total, visible=True),
         )

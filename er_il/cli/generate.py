@@ -16,6 +16,7 @@ def generate(
     arm: str | None = None,
     cameras: Annotated[str | None, arg(metavar="NAME,NAME")] = None,
     size: int | None = None,
+    weights: Path | None = None,
     out: Path | None = None,
 ) -> None:
     """Record demonstrations of a task and write one LeRobot dataset a space.
@@ -24,20 +25,24 @@ def generate(
 
     Args:
         task: Task, such as reach_cup.
-        spaces: Action spaces, separated by commas: joint, task, erj, era, or erj@JOINT to command another joint.
+        spaces: Action spaces, separated by commas: joint, task, erj, era, erx, or erj@JOINT to command another
+            joint.
             They name the datasets' folders.
         episodes: Number of demonstrations.
         seed: Seed of the demonstrations.
         arm: Arm that does the task: panda, or panda8 with eight joints.
         cameras: Cameras to record, separated by commas, such as wrist,shoulder.
         size: Width and height of the cameras' images [px].
+        weights: File of the weights of erx, which er-il advise --fit erx writes; those of the arm if omitted.
         out: Folder of the datasets; datasets/<task> if omitted, and datasets/<task>_<arm> for another arm than the
             recipe's.
     """
     from rich.console import Console
 
+    from er_il.arms.arm import Arm
     from er_il.cli.progress import make_progress
     from er_il.datasets.recipe import Recipe
+    from er_il.datasets.weights import read_weights
     from er_il.support.workers import cores
 
     recipe = usual = Recipe.load(task)
@@ -45,6 +50,9 @@ def generate(
         recipe = recipe.resized(episodes)
     given = {"seed": seed, "arm": arm, "cameras": _split(cameras), "image_size": size}
     recipe = recipe.replaced(**{key: value for key, value in given.items() if value is not None})
+    asked = _split(spaces) or ()
+    file = read_weights(weights, asked)
+    rows = file.of({"": Arm.preset(recipe.arm)})[""] if file else ()
     from er_il.datasets.recording import generate as generate_datasets
     from er_il.support.counts import tally
 
@@ -52,7 +60,7 @@ def generate(
     folder = out if out is not None else Path("datasets") / name
     console = Console()
     with make_progress(console) as progress:
-        generated = generate_datasets(recipe, _split(spaces) or (), folder, progress, cores())
+        generated = generate_datasets(recipe, asked, folder, progress, cores(), rows)
     for space, path in generated.paths.items():
         console.print(
             f"{path}: {'written' if space in generated.new else 'was there already'}", highlight=False, soft_wrap=True

@@ -85,7 +85,7 @@ def joints(study: OmitArgPrefixes[StudyOptions], *, training: Path | None = None
 
 
 def validity(study: OmitArgPrefixes[StudyOptions], *, samples: int = 150) -> None:
-    """Which actions are invalid, and why? Delta and absolute actions of growing size in task, ERJ and ERA.
+    """Which actions are invalid, and why? Delta and absolute actions of growing size in task, ERJ, ERA and ERX.
 
     Args:
         study: Demonstrations and results.
@@ -120,10 +120,32 @@ def deltas(study: OmitArgPrefixes[StudyOptions]) -> None:
     study.run("deltas", study_deltas, lambda report: [terminal_table(table("deltas", **report))])
 
 
+def margins(study: OmitArgPrefixes[StudyOptions]) -> None:
+    """How far do demonstrations stay from folds? Margins and risk of ERJ's joints, ERA and ERX, fitted and not.
+
+    Args:
+        study: Demonstrations and results.
+    """
+    study.check()
+    from er_il.experiments.studies.margins import study_margins
+    from er_il.report.margins import margins_figure, margins_texts
+    from er_il.report.tables import terminal_table
+    from er_il.support.workers import cores
+
+    def measure(arm: "Arm", demos: "Demos", advance: Callable[[int, int], object]) -> dict[str, Any]:
+        return study_margins(arm, demos, cores(), advance)
+
+    def shown(report: dict[str, Any]) -> list[Any]:
+        return [terminal_table(margins_texts(report)), *report["notes"]]
+
+    study.run("margins", measure, shown, margins_figure)
+
+
 Study = (
     Annotated[Any, subcommand("validity", constructor=validity, prefix_name=False)]
     | Annotated[Any, subcommand("joints", constructor=joints, prefix_name=False)]
     | Annotated[Any, subcommand("deltas", constructor=deltas, prefix_name=False)]
+    | Annotated[Any, subcommand("margins", constructor=margins, prefix_name=False)]
 )
 
 

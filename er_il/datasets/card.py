@@ -9,8 +9,11 @@ from lerobot.datasets import create_lerobot_dataset_card
 from lerobot.datasets.io_utils import load_info
 
 from er_il.datasets.dataset import Dataset
+from er_il.kinematics.linear_coordinates import LinearCoordinates
+from er_il.spaces.delta import DeltaSpace
 from er_il.spaces.joint import JOINT
 from er_il.spaces.layout import Layout, Part
+from er_il.spaces.pose import PoseSpace
 from er_il.support.errors import DatasetError
 from er_il.support.provenance import provenance
 
@@ -106,4 +109,9 @@ def _meaning(part: Part, command: str) -> str:
     joint, _, kind = command.rpartition(".")
     if joint in part.space.arm.joints:
         return f"{'change of joint' if kind == 'delta' else 'joint'} `{joint}` [rad]"
+    space = part.space.absolute if isinstance(part.space, DeltaSpace) else part.space
+    redundancy = space.redundancy if isinstance(space, PoseSpace) else None
+    name = command.removesuffix(".delta")
+    if isinstance(redundancy, LinearCoordinates) and name in redundancy.names:
+        return f"{'change of the' if name != command else ''} self-motion {redundancy.formula(name)} [rad]".lstrip()
     return next(meaning for pattern, meaning in _MEANINGS.items() if re.fullmatch(pattern, command))

@@ -10,11 +10,12 @@ from pathlib import Path
 
 from rich.progress import Progress
 
-from er_il.arms.arm import Arm
+from er_il.arms.arm import Arm, Weights
 from er_il.datasets.dataset import Dataset, datasets_in
 from er_il.datasets.demos import Demo, collect, demo_path, make_world
 from er_il.datasets.recipe import Recipe
 from er_il.datasets.record import DatasetRecord
+from er_il.kinematics.linear_coordinates import SPEC_KEY
 from er_il.spaces.layout import Layout
 from er_il.spaces.registry import check_space, make_arm_space
 from er_il.support.atomic_files import PARTIAL, work_folder, write_json
@@ -32,7 +33,9 @@ class Generated:
     dropped: dict[int, str]  # demo seed -> why it is not in the datasets
 
 
-def generate(recipe: Recipe, spaces: Sequence[str], out: Path, progress: Progress, workers: int) -> Generated:
+def generate(
+    recipe: Recipe, spaces: Sequence[str], out: Path, progress: Progress, workers: int, weights: Weights = ()
+) -> Generated:
     """Record a recipe's demos and write one dataset a space into ``out``.
 
     Interrupted at any point, the same call resumes, one process at a time. Datasets that exist are left
@@ -44,20 +47,27 @@ def generate(recipe: Recipe, spaces: Sequence[str], out: Path, progress: Progres
         out: Folder of the datasets. Finished demos wait beside it, in ``<out>.partial``.
         progress: Where to show progress.
         workers: Number of worker processes.
+        weights: Of ERX (n-6, n); the arm's own if empty.
 
     Raises:
         UnknownNameError: unknown task, space, arm or camera.
-        DatasetError: another recipe's data is there, most demos fail, or the folder cannot be written.
+        ArmError: the arm has no such space, or other joints than the weights.
+        DatasetError: another recipe's data is there, or other weights', most demos fail, or the folder cannot be
+            written.
         ErIlError: another process writes there.
     """
     asked, layouts = tuple(dict.fromkeys(spaces)), {}
+    arm = Arm.preset(recipe.arm)
+    arm = arm.weighing(weights) if weights else arm
     for space in asked or ("",):
         check_space(space)
-        layouts[space] = Layout.of_space(make_arm_space(space, Arm.preset(recipe.arm)))  # raises if the arm has none
+        layouts[space] = Layout.of_space(make_arm_space(space, arm))  # raises if the arm has none
     with _writing_to(out), work_folder(out) as work:
         there = {path.name for path in datasets_in(out)} | {space for space in asked if (out / space).exists()}
         for space in sorted(there):
             _check_same(recipe, DatasetRecord.read(out / space).recipe, out / space)
+            if space in layouts:
+                _check_weights(layouts[space], out / space)
         new = tuple(space for space in asked if space not in there)
         first = out / min(there, default=asked[0])
         if not there:
@@ -122,6 +132,11 @@ def _check_same(asked: Recipe, found: Recipe, where: Path) -> None:
         raise DatasetError(
             f"{where} holds another recipe's data; asked for is {difference}. Choose another --out, or delete it."
         )
+
+
+def _check_weights(asked: Layout, dataset: Path) -> None:
+    if asked.spec().get(SPEC_KEY) != Dataset(dataset).spec.get(SPEC_KEY):
+        raise DatasetError(f"{dataset} has other weights of its linear coordinates; choose another --out.")
 
 
 @contextmanager

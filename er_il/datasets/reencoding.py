@@ -10,6 +10,7 @@ from er_il.datasets.dataset import Dataset
 from er_il.datasets.hub import find_dataset
 from er_il.datasets.integrity import check_whole
 from er_il.datasets.number_checks import check_numbers
+from er_il.datasets.weights import WeightsFile
 from er_il.datasets.wiring import Wiring, wire
 from er_il.spaces.joint import JOINT
 from er_il.spaces.layout import Layout
@@ -32,6 +33,7 @@ def reencode(
     *,
     rotation: str,
     wirings: Sequence[Wiring],
+    weights: WeightsFile | None = None,
     keep: bool,
     on_progress: Callable[[int, int], object],
 ) -> Reencoded:
@@ -46,6 +48,7 @@ def reencode(
         kind: See :func:`er_il.spaces.make_action_space`.
         rotation: ``quat`` or ``rot6d``.
         wirings: The arms of a dataset that does not know them.
+        weights: Of ERX; those of the arms if omitted.
         keep: Keep the joint vectors beside the encoded actions.
         on_progress: Called with the number of frames done, and their total.
 
@@ -58,10 +61,8 @@ def reencode(
         raise DatasetError(f"{source} says which arms it is of: leave out --arm and --arms.")
     if not dataset.specified and not wirings:
         raise DatasetError(f"{source} does not say which arm it is of: give --arm, and --joints for its joints.")
-    if dataset.specified:
-        layout = dataset.layout.in_space(kind, rotation)
-    else:
-        layout = wire(wirings, dataset.features, kind, rotation)
+    known = dataset.layout if dataset.specified else wire(wirings, dataset.features, JOINT, rotation)
+    layout = known.in_space(kind, rotation, weights.of(known.arms) if weights else {})
     encoded = dataset.specified and dataset.spec["space"] != JOINT
     decode = encoded and (kind == JOINT or dataset.joints_column(layout) is None)
     check_absent(target)
@@ -82,6 +83,7 @@ def reencode(
 
     def finish(partial: Path) -> None:
         options: dict[str, Any] = {"to": kind, "rotation": rotation, "decoded": decode}
+        options |= {"weights": weights.to_dict()["arms"]} if weights else {}
         # A folder is named without its place on this machine.
         card.sign(Dataset(partial), dataset.root.resolve().name if Path(source).exists() else source, options)
 

@@ -7,19 +7,22 @@ that does not. A policy therefore declares its actions by a tag in its configura
     er_il:<space>/<arm>/<end-effector frame>/<rotation>/<redundant joints>
 
 for instance ``er_il:erj/panda/panda_hand_tcp/quat/panda_joint1``; a dash stands for a part that
-the space does not have, a plus sign joins several joints.
+the space does not have, a plus sign joins several joints. ERX has its weights in their place.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import BaseModel, Field, StrictInt, StrictStr
 
+from er_il.envs.decoders import Decoder, decoder
 from er_il.envs.trust import POSTPROCESSOR, check_steps, read_processor
+from er_il.kinematics.linear_coordinates import SPEC_KEY
 from er_il.kinematics.rotation import Quaternion
 from er_il.spaces.base import ArmSpace
+from er_il.spaces.registry import AT, ERX, weights_text
 from er_il.spaces.spec import action_spec
 from er_il.support.declaration import check_values
 from er_il.support.errors import DatasetError, PolicyError
@@ -40,17 +43,19 @@ class Contract:
     arm: str
     frame: str
     rotation: str = NONE
-    redundant: str = NONE  # joints that the action commands beside the pose, joined by +
+    redundant: str = NONE  # joints that the action commands beside the pose, joined by +, or ERX's weights
 
     @classmethod
     def of_spec(cls, spec: Mapping[str, Any]) -> "Contract":
         """Return the contract of an action space's specification."""
-        arm = spec["arm"]
+        arm, rotation = spec["arm"], spec.get("rotation", NONE)
+        if SPEC_KEY in spec:
+            return cls(spec["space"], arm["name"], arm["ee_frame"], rotation, weights_text(spec[SPEC_KEY]["weights"]))
         # What a space commands beside the pose is the arm's redundant joints only if it names them.
         names = {name.rpartition(".")[0] for name in spec["names"]}  # joint.pos, or joint.delta
         commanded = [joint for joint in arm["redundant"] if joint in names]
         redundant = "+".join(commanded) if "rotation" in spec and commanded else NONE
-        return cls(spec["space"], arm["name"], arm["ee_frame"], spec.get("rotation", NONE), redundant)
+        return cls(spec["space"], arm["name"], arm["ee_frame"], rotation, redundant)
 
     @classmethod
     def of_space(cls, space: ArmSpace) -> "Contract":
@@ -106,6 +111,16 @@ def policy_contract(policy: str | Path) -> Contract:
             "or add the tag to its config.json."
         )
     return declared
+
+
+def decoder_for(name: str, contract: Contract) -> Decoder:
+    """Return a decoder by its report name; ``erx`` has the weights that a policy with this contract was trained with.
+
+    Raises:
+        UnknownNameError: no decoder has that name.
+    """
+    chosen = decoder(name)
+    return replace(chosen, space=ERX + AT + contract.redundant) if chosen.space == contract.space == ERX else chosen
 
 
 def check_policy(policy: str | Path, space: ArmSpace, trust: bool = False) -> None:

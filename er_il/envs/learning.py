@@ -19,7 +19,7 @@ from er_il.kinematics.solver import Status
 from er_il.spaces.carried import CARRIED
 from er_il.spaces.delta import PREFIX, DeltaBounds, DeltaSpace
 from er_il.spaces.joint import JOINT
-from er_il.spaces.registry import AT, ERJ, SPACES, make_arm_space
+from er_il.spaces.registry import AT, CARRIERS, ERJ, SPACES, make_arm_space
 from er_il.support.episode_end import Step
 from er_il.support.errors import UnknownNameError
 from er_il.support.vectors import named_vector
@@ -29,15 +29,15 @@ BOUNDS = DeltaBounds(position=0.05, rotation=0.05, angle=0.075)  # the paper's l
 SUCCESSES, INVALIDS = 10, 5  # in a row, after which an episode is truncated
 CAMERAS, IMAGE_SIZE = ("wrist", "front"), 84  # the paper's
 PIXELS, STATE = "pixels", "state"
-FREE = "-free"  # of ERJ as the paper's text defines it
-MODES = (*SPACES, ERJ + FREE)
+FREE = "-free"  # of ERJ as the paper's text defines it, and likewise of ERX
+MODES = (*SPACES, *(space + FREE for space in CARRIERS))
 
 
 def space_name(mode: str) -> str:
     """The action space of a mode: changes of a space's commands.
 
     ``erj`` carries the hand along, as the paper's code does; ``erj-free`` is ERJ of its text. Both take the joints that
-    they command behind an ``@``, as in ``erj@panda_joint3``.
+    they command behind an ``@``, as in ``erj@panda_joint3``. So do ``erx`` and ``erx-free`` with their weights.
 
     Raises:
         UnknownNameError: no such mode.
@@ -45,7 +45,7 @@ def space_name(mode: str) -> str:
     kind, at, joints = mode.partition(AT)
     if kind not in MODES:
         raise UnknownNameError("mode", mode, MODES)
-    return (CARRIED if kind == ERJ else PREFIX) + kind.removesuffix(FREE) + at + joints
+    return (CARRIED if kind in CARRIERS else PREFIX) + kind.removesuffix(FREE) + at + joints
 
 
 class LearningEnv(gymnasium.Env[Any, NDArray[np.float32]]):

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from er_il.arms.arm import Arm
 from er_il.control.commander import check_answer
-from er_il.envs.contract import check_policy, policy_contract
+from er_il.envs.contract import check_policy, decoder_for, policy_contract
 from er_il.envs.decoders import decoder
 from er_il.envs.tasks import task_id
 from er_il.support.errors import ErIlError
@@ -22,5 +22,7 @@ def check_evaluation(policy: Path, task: str, decoder_name: str, episodes: int, 
         raise ErIlError(f"{episodes} episodes say nothing; ask for at least one.")
     task_id(task)
     check_answer(on_invalid)
-    chosen, contract = decoder(decoder_name), policy_contract(policy)
+    decoder(decoder_name)  # a mistake in the name is told first
+    contract = policy_contract(policy)
+    chosen = decoder_for(decoder_name, contract)
     check_policy(policy, chosen.space_of(Arm.preset(contract.arm), contract.rotation_code), trust)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.progress import Progress
 
+from er_il.arms.arm import Arm
 from er_il.datasets.dataset import Dataset
 from er_il.datasets.recipe import Recipe
 from er_il.datasets.record import read_episodes
@@ -20,12 +21,15 @@ from er_il.evaluation.posture_baselines import POSTURE_BASELINES, POSTURE_DECODE
 from er_il.experiments.schedule import Job
 from er_il.policy.configuration import default_config
 from er_il.policy.training import PRECISION, Training, train_episodes
-from er_il.spaces.registry import arm_space_from_spec
+from er_il.spaces.layout import Layout
+from er_il.spaces.registry import ERX, arm_space_from_spec, make_arm_space
 from er_il.spaces.spec import action_spec
 from er_il.support.atomic_files import write_json
 from er_il.support.cost import Cost, measured
 from er_il.support.errors import ErIlError
 from er_il.support.provenance import git_sha
+
+Array = NDArray[np.float64]
 
 FILM_EVERY = 2  # control steps a picture: shadows make each expensive
 _LOGGED_STEP = re.compile(r"step:([\d.]+)(K?)")  # as lerobot-train logs it
@@ -48,6 +52,45 @@ class Demonstrate(Job):
     def run(self) -> None:
         generate(self.recipe, self.spaces, self.path, Progress(disable=True), self.workers)
 
+    def dataset(self, space: str) -> Path:
+        """The dataset of a space."""
+        return self.path / space
+
+
+@dataclass(frozen=True)
+class FitWeights(Job):
+    """Fit ERX's weights to the demonstrations that a policy is trained on, and to these alone: a dataset in ERX.
+
+    The others are encoded by the same weights.
+    """
+
+    needs: tuple[Demonstrate]
+    demonstrations: int  # the first ones of the training episodes
+
+    stage = "Fit"
+
+    @property
+    def recipe(self) -> Recipe:
+        """Recipe of the demonstrations."""
+        return self.needs[0].recipe
+
+    def dataset(self, space: str) -> Path:
+        """The dataset, which is of one space only."""
+        return self.path
+
+    def run(self) -> None:
+        from lerobot.utils.utils import SuppressProgressBars
+
+        from er_il.datasets.encoding import encode_dataset
+        from er_il.spaces.margin import demonstrated_weights
+
+        (demonstrated,) = self.needs
+        source, arm = demonstrated.dataset(demonstrated.spaces[0]), Arm.preset(self.recipe.arm)
+        leader, _ = _training_paths(source, self.demonstrations)
+        fitted = arm.weighing(demonstrated_weights(arm, [path[:, : arm.dof] for path in leader]))
+        with SuppressProgressBars():
+            encode_dataset(Dataset(source), self.path, Layout.of_space(make_arm_space(ERX, fitted)))
+
 
 @dataclass(frozen=True)
 class Train(Job):
@@ -56,7 +99,7 @@ class Train(Job):
     The result is notes (JSON) on the policy's cost and origin; the training is in the folder of that name beside.
     """
 
-    needs: tuple[Demonstrate]
+    needs: tuple[Demonstrate | FitWeights]
     space: str
     seed: int
     demonstrations: int  # the first ones of the training episodes
@@ -67,8 +110,8 @@ class Train(Job):
     @property
     def training(self) -> Training:
         """The training; the dataset must be there."""
-        (demonstrated,) = self.needs
-        task, dataset = demonstrated.recipe.task, demonstrated.path / self.space
+        (source,) = self.needs
+        task, dataset = source.recipe.task, source.dataset(self.space)
         out, config = self.path.with_suffix(""), default_config(self.space, self.configuration)
         return Training(task, self.space, dataset, out, config, self.size, self.seed, self.demonstrations)
 
@@ -147,14 +190,19 @@ class Film(Job):
 
 
 @lru_cache(maxsize=4)  # jobs of one policy follow one another
-def _demonstrated(training: Training) -> tuple[list[NDArray[np.float64]], ElbowReference | None]:
+def _demonstrated(training: Training) -> tuple[list[Array], ElbowReference | None]:
     """The leader's paths (T, n + 1) [rad and opening] that a policy was trained on, and where the elbow was."""
-    info, episodes = Dataset(training.dataset).info, read_episodes(training.dataset)
+    info = Dataset(training.dataset).info
     arm = arm_space_from_spec(action_spec(info["features"])).arm
-    chosen = [episodes[i] for i in train_episodes(info)[: training.demonstrations]]
-    followed = [demo.state[:, : arm.dof].astype(np.float64) for demo in chosen]
-    leader = [demo.leader.astype(np.float64) for demo in chosen]
-    return leader, ElbowReference.of_demos(arm, 1 / info["fps"], followed)
+    leader, state = _training_paths(training.dataset, training.demonstrations)
+    return leader, ElbowReference.of_demos(arm, 1 / info["fps"], [path[:, : arm.dof] for path in state])
+
+
+def _training_paths(dataset: Path, demonstrations: int | None) -> tuple[list[Array], list[Array]]:
+    """The leader's paths (T, n + 1) [rad and opening] and the states (T, s) in the first training episodes."""
+    episodes = read_episodes(dataset)
+    chosen = [episodes[i] for i in train_episodes(Dataset(dataset).info)[:demonstrations]]
+    return [demo.leader.astype(np.float64) for demo in chosen], [demo.state.astype(np.float64) for demo in chosen]
 
 
 def _notes(cost: Cost) -> dict[str, Any]:

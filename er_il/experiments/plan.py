@@ -15,9 +15,11 @@ from er_il.datasets.record import DatasetRecord
 from er_il.evaluation.posture_baselines import space_of
 from er_il.evaluation.rollout import FIRST_SEED
 from er_il.experiments.grid import Cell, Grid
-from er_il.experiments.jobs import Demonstrate, RollOut, Train
+from er_il.experiments.jobs import Demonstrate, FitWeights, RollOut, Train
 from er_il.policy.configuration import default_config, default_steps, read_config
 from er_il.policy.rows import POLICY_ROWS
+from er_il.spaces.joint import JOINT
+from er_il.spaces.registry import ERX
 from er_il.support.atomic_files import PARTIAL, write_json
 from er_il.support.errors import ErIlError
 from er_il.support.folder_lock import LOCK, folder_lock
@@ -62,13 +64,14 @@ class Plan:
         strangers = {name for name in found - {LOCK} if PARTIAL not in name}  # a kill may come before the owner is said
         if strangers and OWNER not in found:
             raise ErIlError(f"{self.out} holds something else than an experiment; choose another --out.")
-        for task, demonstrate in self._demonstrations.items():
-            for dataset in filter(Path.exists, (demonstrate.path / space for space in demonstrate.spaces)):
-                if what := demonstrate.recipe.differences(DatasetRecord.read(dataset).recipe):
-                    raise ErIlError(
-                        f"{dataset} holds another recipe's demonstrations; asked for is {what}. "
-                        f"Choose another --out, or delete what {self.out} holds of {task}."
-                    )
+        for cell in grid.cells:
+            source = self._source(cell)
+            dataset = source.dataset(space_of(cell.decoder))
+            if dataset.exists() and (what := source.recipe.differences(DatasetRecord.read(dataset).recipe)):
+                raise ErIlError(
+                    f"{dataset} holds another recipe's demonstrations; asked for is {what}. "
+                    f"Choose another --out, or delete what {self.out} holds of {cell.task}."
+                )
         mine = {name: read_config(default_config(name, grid.configuration)) for name in grid.spaces}
         owned = read_json(owner, ErIlError) if owner.exists() else {"title": grid.title, "configurations": {}}
         if not isinstance(owned.get("configurations"), dict) or "title" not in owned:
@@ -85,11 +88,21 @@ class Plan:
 
     @cached_property
     def _demonstrations(self) -> dict[str, Demonstrate]:
-        folder, spaces, jobs = self.out / "datasets", self.grid.spaces, {}
+        # Weights of ERX belong to the demonstrations that a policy sees: see _source.
+        spaces = tuple(space for space in self.grid.spaces if space != ERX) or (JOINT,)
+        folder, jobs = self.out / "datasets", {}
         for task in self.grid.tasks:
             recipe, name = self.grid.recipe(task), f"demonstrate {task}"
             jobs[task] = Demonstrate(folder / task, name, (), recipe.episodes, recipe, spaces, self.recorders)
         return jobs
+
+    def _source(self, cell: Cell) -> Demonstrate | FitWeights:
+        """What makes the dataset of a cell's policy."""
+        demonstrated, count = self._demonstrations[cell.task], cell.demonstrations
+        if space_of(cell.decoder) != ERX:
+            return demonstrated
+        path = self.out / "fitted" / cell.task / f"{ERX}-{count}-demonstrations"
+        return FitWeights(path, f"fit {ERX} to {count} demonstrations of {cell.task}", (demonstrated,), 1, count)
 
     def training(self, cell: Cell, seed: int) -> Train:
         """The training of a cell's policy."""
@@ -100,7 +113,7 @@ class Plan:
         return Train(
             self.out / "policies" / task / space / f"{variant}.json",
             f"train {task} {space} on {count} demonstrations, seed {seed}",
-            (self._demonstrations[task],),
+            (self._source(cell),),
             size=steps,
             space=space,
             seed=seed,

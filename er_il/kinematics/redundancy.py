@@ -132,7 +132,32 @@ class Redundancy(ABC):
 
 
 @dataclass(frozen=True, eq=False)
-class JointAngle(Redundancy):
+class LinearRedundancy(Redundancy):
+    """Values W q that are linear in the joints, with orthonormal rows of W."""
+
+    @cached_property
+    @abstractmethod
+    def weights(self) -> Array:
+        """W (m, n), which is the values' derivative everywhere."""
+
+    @cached_property
+    def _rows(self) -> list[list[float]]:
+        return self.weights.tolist()
+
+    def along(self, q: Array) -> Array:
+        return q @ self.weights.T
+
+    def slope(self, q: Sequence[Any], points: Sequence[Components], xp: Any = math) -> Slope:
+        values = [sum(weight * angle for weight, angle in zip(row, q, strict=True) if weight) for row in self._rows]
+        return Slope(values, 1.0, by_joints=self.weights)
+
+    def moved(self, q: Array, change: Array) -> Array:
+        """Angles (..., n) [rad] after the smallest change of q (..., n) that changes the values by (..., m) [rad]."""
+        return q + change @ self.weights
+
+
+@dataclass(frozen=True, eq=False)
+class JointAngle(LinearRedundancy):
     """The angles of chosen joints (ERJ, paper IV-C); inverse kinematics solves the others.
 
     Raises:
@@ -158,8 +183,6 @@ class JointAngle(Redundancy):
     def held(self) -> tuple[int, ...]:
         return tuple(self.arm.joints.index(joint) for joint in self.joints)
 
-    def along(self, q: Array) -> Array:
-        return q[:, self.held]
-
-    def slope(self, q: Sequence[Any], points: Sequence[Components], xp: Any = math) -> Slope:
-        return Slope([q[joint] for joint in self.held], 1.0, by_joints=np.eye(self.arm.dof)[list(self.held)])
+    @cached_property
+    def weights(self) -> Array:
+        return np.eye(self.arm.dof)[list(self.held)]

@@ -18,8 +18,7 @@ from safetensors.torch import load_model
 from threadpoolctl import threadpool_limits
 
 from er_il.control.commander import BEST_EFFORT
-from er_il.envs.contract import policy_contract
-from er_il.envs.decoders import decoder
+from er_il.envs.contract import decoder_for, policy_contract
 from er_il.envs.lerobot_plugin import ErIlEnvConfig
 from er_il.policy.rows import POLICY_ROWS
 from er_il.support.errors import PolicyError
@@ -32,8 +31,8 @@ def environment_of(
 
     Check the policy against the environment that comes of it: :func:`er_il.envs.contract.check_policy`.
     """
-    chosen = decoder(decoder_name)
     contract = policy_contract(policy)
+    chosen = decoder_for(decoder_name, contract)
     images = _load_config(policy).image_features
     sizes = {feature.shape[-1] for feature in images.values()}
     return ErIlEnvConfig(

@@ -19,7 +19,7 @@ from er_il.datasets.recipe import TRAIN
 from er_il.envs.contract import Contract
 from er_il.policy.configuration import input_features, named_inputs, read_config
 from er_il.policy.training_data import check_training_data
-from er_il.spaces.registry import check_space, split_name
+from er_il.spaces.registry import AND, check_space, split_name
 from er_il.spaces.spec import action_spec
 from er_il.support.atomic_files import work_folder, write_atomically
 from er_il.support.errors import DatasetError, PolicyError
@@ -57,12 +57,11 @@ class Training:
         if not self.config.is_file():
             raise PolicyError(f"There is no training configuration {self.config}.")
         spec = action_spec(Dataset(self.dataset).features)
-        kind, joints = split_name(self.space)
+        kind, choice = split_name(self.space)
         if spec["space"] != kind:
             raise DatasetError(f"The dataset at {self.dataset} holds {spec['space']} actions, not {kind}.")
-        if joints and tuple(spec["arm"]["redundant"]) != joints:
-            commanded = ", ".join(spec["arm"]["redundant"])
-            raise DatasetError(f"The dataset at {self.dataset} commands {commanded}, not {', '.join(joints)}.")
+        if choice and (commanded := Contract.of_spec(spec).redundant) != AND.join(choice):
+            raise DatasetError(f"The dataset at {self.dataset} commands {commanded}, not {AND.join(choice)}.")
 
     @property
     def command(self) -> list[str]:

@@ -41,6 +41,11 @@ def choices_texts(report: Report, choices: Sequence[str]) -> pd.DataFrame:
     return table("joints", report=report, sets=measures(report), risks=risks(report), choices=choices)
 
 
+def advice_texts(report: Report) -> pd.DataFrame:
+    """Texts of the study's table, the best choices first."""
+    return choices_texts(report, list(map(joined, report["ranking"])))
+
+
 def joints_table(report: Report) -> str:
     """Every choice of joints, the best first; then the notes."""
     risk = risks(report)

@@ -40,6 +40,7 @@ LOOKS = {
     "task": Look("Task", ORANGE),
     "erj": Look("ERJ", GREEN),
     "era": Look("ERA", PURPLE),
+    "erx": Look("ERX", BLUE),
     "task-nearest": Look("Task (nearest)", ORANGE),
     "task-posture": Look("Task (posture)", RED),
     "task-clear": Look("Task (clear)", BLUE),

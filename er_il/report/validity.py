@@ -13,7 +13,7 @@ from er_il.report.style import BLUE, DOTTED, GREY, INK, LOOKS, RED, SKY, YELLOW,
 from er_il.report.tables import markdown_table
 from er_il.report.text import Report, sentences, table
 
-SPACES = ("task", "erj", "era")
+SPACES = ("task", "erj", "era", "erx")
 AROUND = {"demos": "demonstrations", "random": "random states"}
 UNDAMPED = ", undamped"
 CAUSES = {
@@ -47,7 +47,7 @@ def summary(report: Report) -> list[dict[str, Any]]:
     rows = rows.join(counts.filter(like="causes.").div(counts["actions"], axis="index"))
     rows["share"] = counts["invalid"] / counts["actions"]
     rows[["low", "high"]] = [exact_interval(*each) for each in zip(counts["invalid"], counts["actions"], strict=True)]
-    order = pd.MultiIndex.from_product((AROUND, SOLVERS, SPACES), names=rows.index.names)
+    order = pd.MultiIndex.from_product((AROUND, SOLVERS, _spaces(report)), names=rows.index.names)
     return rows.reindex(order).reset_index().to_dict("records")
 
 
@@ -72,8 +72,9 @@ def validity_figure(report: Report) -> Figure:
     data[["low", "high"]] = 100 * np.array(data["interval"].tolist())
     data.loc[~data["damped"], ["low", "high"]] = np.nan  # their intervals are alike, and would hide the others
     data["series"] = data["space"].where(data["damped"], data["space"] + UNDAMPED)
+    curves = {name: look for name, look in CURVES.items() if name in set(data["series"])}
     for axis, (around, mode) in zip(axes[0], itertools.product(AROUND, ("delta", "absolute")), strict=True):
-        curve_chart(axis, where(data, around=around, mode=mode), CURVES, log=True)
+        curve_chart(axis, where(data, around=around, mode=mode), curves, log=True)
         percent_axis(axis)
         axis.set(xlabel="Action size [mm]", title=f"{mode.capitalize()} actions around {AROUND[around]}")
     pooled = _pooled(report)
@@ -89,13 +90,19 @@ def validity_figure(report: Report) -> Figure:
         most = most.assign(group=most["space"].map(label_of), series=most["damped"], value=most[median])
         bar_chart(axis, most.assign(low=most[median], high=most[tail]), SOLVERS)
         axis.set_title(title)
-    for x, space in enumerate(SPACES):
-        axes[1, 3].plot([x - 0.45, x + 0.45], [report["paper_ms"][space]] * 2, color=INK, linewidth=1.2)
+    for x, space in enumerate(_spaces(report)):
+        if space in report["paper_ms"]:
+            axes[1, 3].plot([x - 0.45, x + 0.45], [report["paper_ms"][space]] * 2, color=INK, linewidth=1.2)
     axes[0, 0].set_ylabel("Invalid actions [%]")
     axes[1, 0].set_ylabel("Invalid actions by cause [%]")
     for axis in (axes[0, 0], axes[1, 0], axes[1, 2]):
         axis.legend(loc="upper left")
     return figure
+
+
+def _spaces(report: Report) -> list[str]:
+    """The spaces that were studied, in the order in which they are shown."""
+    return sorted({row["space"] for row in report["pooled"]}, key=SPACES.index)
 
 
 def _pooled(report: Report) -> pd.DataFrame:

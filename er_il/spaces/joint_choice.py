@@ -23,6 +23,7 @@ from scipy.spatial.transform import Rotation
 
 from er_il.arms.arm import Arm, Vector
 from er_il.kinematics.redundancy import JointAngle, Redundancy
+from er_il.kinematics.self_motion import self_motions
 from er_il.kinematics.solver import Status, kinematics_of
 from er_il.spaces.base import Array
 from er_il.spaces.pose import PoseSpace
@@ -98,8 +99,7 @@ def sensitivity(redundancy: Redundancy, q: Array) -> Sensitivity:
     left = jacobians if redundancy.held else np.concatenate([jacobians, derivative], axis=1)
     left = np.delete(left, list(redundancy.held), axis=2)
     values = np.asarray(np.linalg.svd(left, compute_uv=False), dtype=np.float64)
-    basis = np.linalg.svd(jacobians)[2][:, -derivative.shape[1] :]  # (N, m, n) self-motion
-    share = np.abs(np.linalg.det(basis @ derivative.transpose(0, 2, 1)))
+    share = np.abs(np.linalg.det(self_motions(redundancy.arm, q) @ derivative.transpose(0, 2, 1)))
     smallest = values[:, -1]
     return Sensitivity(smallest, values[:, 0] / np.maximum(smallest, 1e-12), np.sign(np.linalg.det(left)) * share)
 
@@ -135,7 +135,7 @@ def along_demos(arm: Arm, choice: Choice, demos: Sequence[Array]) -> Fitness:
     space, q = _space(arm, choice), np.concatenate(demos)
     found = sensitivity(JointAngle(arm, choice), q)
     ends = np.cumsum([len(demo) for demo in demos])[:-1]
-    off = [play_back(space, demo, np.random.default_rng(i)) > FLIP for i, demo in enumerate(demos)]
+    off = off_branch(space, demos)
     risky = np.concatenate(off) | (found.smallest < SINGULAR)
     return replace(
         _fitness(arm, choice, q, found, risky),
@@ -143,6 +143,11 @@ def along_demos(arm: Arm, choice: Choice, demos: Sequence[Array]) -> Fitness:
         off=float(np.concatenate(off).mean()),
         flips=float(np.mean([np.count_nonzero(np.diff(each)) for each in off])),
     )
+
+
+def off_branch(space: PoseSpace, demos: Sequence[Array]) -> list[NDArray[np.bool_]]:
+    """The steps (T,) of each demo whose joints are on another branch in playback."""
+    return [play_back(space, demo, np.random.default_rng(i)) > FLIP for i, demo in enumerate(demos)]
 
 
 def play_back(space: PoseSpace, demo: Array, rng: np.random.Generator) -> Vector:

@@ -8,11 +8,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import accumulate, pairwise
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from er_il.arms.arm import Arm, Weights
 from er_il.arms.portable import arm_from_spec, arm_spec
 from er_il.kinematics.solver import BatchResult, IkResult
 from er_il.spaces.base import ArmSpace
@@ -120,10 +122,22 @@ class Layout:
         """Angles (..., n) [rad] of an arm in joint vectors (..., D)."""
         return part.motors.angles(np.asarray(vectors)[..., self.indices(part)])
 
-    def in_space(self, kind: str, rotation: str) -> "Layout":
-        """The same layout in another action space (see :func:`er_il.spaces.registry.make_arm_space`)."""
-        parts = (replace(part, space=make_arm_space(kind, part.space.arm, rotation=rotation)) for part in self.parts)
-        return replace(self, parts=tuple(parts))
+    @property
+    def arms(self) -> dict[str, Arm]:
+        """The arms by their labels."""
+        return {part.label: part.space.arm for part in self.parts}
+
+    def in_space(self, kind: str, rotation: str, weights: Mapping[str, Weights] = MappingProxyType({})) -> "Layout":
+        """The same layout in another action space (see :func:`er_il.spaces.registry.make_arm_space`).
+
+        Args:
+            kind: Name of the space.
+            rotation: ``quat`` or ``rot6d``.
+            weights: Of ERX's coordinates, by the arm's label; those of the arms where it says nothing.
+        """
+        arms = self.arms | {label: self.arms[label].weighing(rows) for label, rows in weights.items()}
+        spaces = {label: make_arm_space(kind, arm, rotation=rotation) for label, arm in arms.items()}
+        return replace(self, parts=tuple(replace(part, space=spaces[part.label]) for part in self.parts))
 
     def split(self, vector: Array) -> tuple[list[Array], Array]:
         """Split joint vectors (..., D) into each arm's angles (..., n) [rad] and the other dimensions (..., k)."""

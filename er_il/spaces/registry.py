@@ -1,11 +1,12 @@
 """Action spaces by name, and from specifications."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import Any
 
-from er_il.arms.arm import Arm, Vector
+from er_il.arms.arm import Arm, Vector, Weights
 from er_il.kinematics.arm_angle import ArmAngle
+from er_il.kinematics.linear_coordinates import SPEC_KEY, LinearCoordinates
 from er_il.kinematics.redundancy import JointAngle, Redundancy
 from er_il.kinematics.rotation import Quaternion, RotationCode, make_rotation
 from er_il.kinematics.solver import kinematics_of
@@ -13,6 +14,7 @@ from er_il.spaces.base import ArmSpace
 from er_il.spaces.carried import CARRIED, CarriedDeltaSpace
 from er_il.spaces.delta import PREFIX, DeltaBounds, DeltaSpace
 from er_il.spaces.joint import JOINT, JointSpace
+from er_il.spaces.margin import home_weights
 from er_il.spaces.pose import TASK, PoseSpace
 from er_il.spaces.spec import SPEC_VERSION
 from er_il.spaces.spec_types import check_types
@@ -29,12 +31,22 @@ def _arm_angle(arm: Arm) -> Redundancy:
     return ArmAngle.from_home(arm)
 
 
-ERJ, ERA = "erj", "era"
-REDUNDANCIES: dict[str, Callable[[Arm], Redundancy]] = {ERJ: _joint_angle, ERA: _arm_angle}  # of the ER spaces
+def _linear_coordinates(arm: Arm) -> Redundancy:
+    return LinearCoordinates(arm, arm.weights or home_weights(arm))
+
+
+ERJ, ERA, ERX = "erj", "era", "erx"
+REDUNDANCIES: dict[str, Callable[[Arm], Redundancy]] = {  # of the ER spaces
+    ERJ: _joint_angle,
+    ERA: _arm_angle,
+    ERX: _linear_coordinates,
+}
+CARRIERS = (ERJ, ERX)  # whose changes can carry the pose's target along
 SPACES = (JOINT, TASK, *REDUNDANCIES)
 RELATIVE: dict[str, type[DeltaSpace]] = {PREFIX: DeltaSpace, CARRIED: CarriedDeltaSpace}  # by the prefix of the name
 
 AT, AND = "@", "+"  # as in erj@panda_joint3, or erj@panda_joint1+panda_joint3 with two redundant joints
+THEN = ":"  # between the weights of a row, as in erx@0.8:-0.6:0:0:0:0:0
 
 
 def make_arm_space(
@@ -48,9 +60,10 @@ def make_arm_space(
     """Build the action space of an arm, without a gripper, by name.
 
     Args:
-        name: ``joint``, ``task``, ``erj`` or ``era``; with ``delta_`` in front, changes of its commands, and with
-            ``carried_`` such that the pose's target moves along with ERJ's joint (:mod:`er_il.spaces.carried`).
-            ``erj@<joint>`` commands another than the arm's default joint; several are joined by ``+``.
+        name: ``joint``, ``task``, ``erj``, ``era`` or ``erx``; with ``delta_`` in front, changes of its commands, and
+            with ``carried_`` such that the pose's target moves along with ERJ's joint or ERX's coordinates
+            (:mod:`er_il.spaces.carried`). ``erj@<joint>`` commands another than the arm's default joint; several are
+            joined by ``+``. ``erx@<weights>`` has other weights than the arm's (:func:`erx_name`).
         arm: The arm it commands.
         rotation: ``quat`` or ``rot6d``; the quaternion's hemisphere is that of the arm's home pose.
             Deltas always use a rotation vector.
@@ -59,11 +72,12 @@ def make_arm_space(
 
     Raises:
         UnknownNameError: unknown name or rotation.
-        ArmError: an ER space for an arm without redundancy, ERA without the arm's angle frames, or joints that
-            the arm does not have.
+        ArmError: an ER space for an arm without redundancy, ERA without the arm's angle frames, or joints or weights
+            that do not suit the arm.
     """
-    kind, joints = split_name(name)
-    arm = arm.commanding(joints) if joints else arm
+    kind, choice = split_name(name)
+    if choice:
+        arm = arm.weighing(_weights(choice)) if kind.endswith(ERX) else arm.commanding(choice)
     code = make_rotation(rotation, kinematics_of(arm).fk(arm.home)[:3, :3])
     prefix, absolute = _split_kind(kind)
     space = _absolute(absolute, arm, code, posture)
@@ -71,18 +85,40 @@ def make_arm_space(
 
 
 def split_name(name: str) -> tuple[str, tuple[str, ...]]:
-    """Split a space's name into its kind and the joints that it says ERJ commands, () if it says nothing.
+    """Split a space's name into its kind and what it says beyond: ERJ's joints, or ERX's rows; () if it says nothing.
 
     Raises:
-        UnknownNameError: no such kind, or joints for a kind that commands none.
+        UnknownNameError: no such kind, or joints or weights for a kind that has none.
     """
-    kind, at, joints = name.partition(AT)
+    kind, at, said = name.partition(AT)
     prefix, absolute = _split_kind(kind)
-    if absolute not in SPACES or (prefix == CARRIED and absolute != ERJ):
-        raise UnknownNameError("action space", kind, [*SPACES, *(PREFIX + space for space in SPACES), CARRIED + ERJ])
-    if at and (absolute != ERJ or not joints):
-        raise UnknownNameError("action space", name, [*SPACES, f"{ERJ}{AT}JOINT"])
-    return kind, tuple(joints.split(AND)) if at else ()
+    if absolute not in SPACES or (prefix == CARRIED and absolute not in CARRIERS):
+        deltas = [*(PREFIX + space for space in SPACES), *(CARRIED + space for space in CARRIERS)]
+        raise UnknownNameError("action space", kind, [*SPACES, *deltas])
+    if not at:
+        return kind, ()
+    choice = tuple(said.split(AND))
+    if not (all(choice) and (absolute == ERJ or (absolute == ERX and _weights(choice)))):
+        raise UnknownNameError("action space", name, [*SPACES, f"{ERJ}{AT}JOINT", f"{ERX}{AT}NUMBER{THEN}NUMBER..."])
+    return kind, choice
+
+
+def erx_name(weights: Weights) -> str:
+    """Name of ERX with weights W (m, n): ``erx@0.8:-0.6:0.0:...``, rows joined by ``+``."""
+    return ERX + AT + weights_text(weights)
+
+
+def weights_text(weights: Sequence[Sequence[float]]) -> str:
+    """Weights as a name says them."""
+    return AND.join(THEN.join(map(repr, map(float, row))) for row in weights)
+
+
+def _weights(rows: Sequence[str]) -> Weights:
+    """The weights that a name says; () if they are no numbers."""
+    try:
+        return tuple(tuple(map(float, row.split(THEN))) for row in rows)
+    except ValueError:
+        return ()
 
 
 def _split_kind(kind: str) -> tuple[str, str]:
@@ -99,8 +135,12 @@ def check_space(name: str) -> None:
 
 def name_of(space: ArmSpace, arm: Arm) -> str:
     """Name a space as :func:`make_arm_space` would make it for ``arm``."""
-    commands_others = _split_kind(space.kind)[1] == ERJ and space.arm.redundant != arm.redundant
-    return space.kind + (AT + AND.join(space.arm.redundant) if commands_others else "")
+    absolute = _split_kind(space.kind)[1]
+    if absolute == ERJ and space.arm.redundant != arm.redundant:
+        return space.kind + AT + AND.join(space.arm.redundant)
+    if absolute == ERX and space.arm.weights != arm.weights:
+        return space.kind + AT + weights_text(space.arm.weights)
+    return space.kind
 
 
 def arm_space_from_spec(spec: Mapping[str, Any], arm: Arm | None = None, *, posture: Vector | None = None) -> ArmSpace:
@@ -122,6 +162,8 @@ def arm_space_from_spec(spec: Mapping[str, Any], arm: Arm | None = None, *, post
         arm = arm if arm is not None else Arm.preset(described["name"])
         with suppress(ArmError):  # an arm without those joints is told below what differs
             arm = arm.commanding(described["redundant"])
+            if SPEC_KEY in spec:
+                arm = arm.weighing(spec[SPEC_KEY]["weights"])
         rotation: RotationCode = make_rotation(
             spec.get("rotation", Quaternion.kind), kinematics_of(arm).fk(arm.home)[:3, :3]
         )

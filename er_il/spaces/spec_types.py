@@ -45,6 +45,11 @@ class _Angle(BaseModel):
     reference: Number = 0.0
 
 
+class _LinearCoordinates(BaseModel):
+    joints: Names = []
+    weights: list[Numbers] = []
+
+
 class _Space(BaseModel):
     label: StrictStr = ""
     space: StrictStr = ""
@@ -54,6 +59,7 @@ class _Space(BaseModel):
     rotation: StrictStr = ""
     hemisphere: Annotated[Numbers, Field(min_length=4, max_length=4), AfterValidator(_unit)] = [0, 0, 0, 1]
     arm_angle: _Angle = _Angle()
+    linear_coordinates: _LinearCoordinates = _LinearCoordinates()
     bounds: dict[StrictStr, Annotated[Number, Field(gt=0)]] = {}
 
 
