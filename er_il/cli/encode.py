@@ -25,7 +25,7 @@ def encode(
 
     Args:
         source: Folder of the dataset, or its repository id on the hub.
-        to: joint, task, erj or era; joint goes back through the decoder to the robot's own joint values.
+        to: joint, task, erj, era or era@stereo; joint goes back through the decoder to the robot's own joint values.
         out: Folder of the new dataset.
         robot: The arm of a dataset that does not know it.
         redundant: Joints of the URDF that erj commands; the first ones if omitted.

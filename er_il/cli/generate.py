@@ -24,7 +24,8 @@ def generate(
 
     Args:
         task: Task, such as reach_cup.
-        spaces: Action spaces, separated by commas: joint, task, erj, era, or erj@JOINT to command another joint.
+        spaces: Action spaces, separated by commas: joint, task, erj, era, or erj@JOINT to command another joint,
+            era@stereo for another reference of the arm angle.
             They name the datasets' folders.
         episodes: Number of demonstrations.
         seed: Seed of the demonstrations.

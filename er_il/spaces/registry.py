@@ -2,11 +2,13 @@
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 from er_il.arms.arm import Arm, Vector
-from er_il.kinematics.arm_angle import ArmAngle
+from er_il.kinematics.arm_angle import STEREO, UP, ArmAngle
 from er_il.kinematics.redundancy import JointAngle, Redundancy
+from er_il.kinematics.reference_direction import ReferenceDirection
 from er_il.kinematics.rotation import Quaternion, RotationCode, make_rotation
 from er_il.kinematics.solver import kinematics_of
 from er_il.spaces.base import ArmSpace
@@ -23,14 +25,18 @@ def _joint_angle(arm: Arm) -> Redundancy:
     return JointAngle(arm, arm.redundant)
 
 
-def _arm_angle(arm: Arm) -> Redundancy:
+def _arm_angle(direction: ReferenceDirection, arm: Arm) -> Redundancy:
     if arm.redundancy > 1:
         raise ArmError(f"{arm.name} has {arm.redundancy} redundant joints; one arm angle fixes only one. Use erj.")
-    return ArmAngle.from_home(arm)
+    return ArmAngle.from_home(arm, direction)
 
 
-ERJ, ERA = "erj", "era"
-REDUNDANCIES: dict[str, Callable[[Arm], Redundancy]] = {ERJ: _joint_angle, ERA: _arm_angle}  # of the ER spaces
+ERJ, ERA, ERA_STEREO = "erj", "era", "era@stereo"
+REDUNDANCIES: dict[str, Callable[[Arm], Redundancy]] = {  # of the ER spaces
+    ERJ: _joint_angle,
+    ERA: partial(_arm_angle, UP),
+    ERA_STEREO: partial(_arm_angle, STEREO),
+}
 SPACES = (JOINT, TASK, *REDUNDANCIES)
 RELATIVE: dict[str, type[DeltaSpace]] = {PREFIX: DeltaSpace, CARRIED: CarriedDeltaSpace}  # by the prefix of the name
 
@@ -51,6 +57,7 @@ def make_arm_space(
         name: ``joint``, ``task``, ``erj`` or ``era``; with ``delta_`` in front, changes of its commands, and with
             ``carried_`` such that the pose's target moves along with ERJ's joint (:mod:`er_il.spaces.carried`).
             ``erj@<joint>`` commands another than the arm's default joint; several are joined by ``+``.
+            ``era@stereo`` counts the arm angle from the stereographic reference.
         arm: The arm it commands.
         rotation: ``quat`` or ``rot6d``; the quaternion's hemisphere is that of the arm's home pose.
             Deltas always use a rotation vector.
@@ -76,7 +83,8 @@ def split_name(name: str) -> tuple[str, tuple[str, ...]]:
     Raises:
         UnknownNameError: no such kind, or joints for a kind that commands none.
     """
-    kind, at, joints = name.partition(AT)
+    of_reference = _split_kind(name)[1] == ERA_STEREO
+    kind, at, joints = (name, "", "") if of_reference else name.partition(AT)
     prefix, absolute = _split_kind(kind)
     if absolute not in SPACES or (prefix == CARRIED and absolute != ERJ):
         raise UnknownNameError("action space", kind, [*SPACES, *(PREFIX + space for space in SPACES), CARRIED + ERJ])
