@@ -174,8 +174,11 @@ class Commander:
         return replace(decoded, status=Status.JUMP) if jumps else decoded
 
     def _eased(self, decoded: IkResult, action: ArrayLike, q: ArrayLike) -> Vector:
-        """The decoded joints or, if they are far, as much of the action as lies near with its pose."""
+        """The decoded joints or, if they are far or not what the action is about, those near that have its pose."""
         measured = np.asarray(q, dtype=np.float64)
+        steady = self.space.steady(action, measured)
+        if steady is not None and not self._far(steady, measured):
+            return steady
         if not self._far(decoded.q, measured):
             return decoded.q
         eased = self.space.ease(action, measured, JUMP_PERIODS * self._reach, self.last)

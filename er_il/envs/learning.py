@@ -30,7 +30,7 @@ SUCCESSES, INVALIDS = 10, 5  # in a row, after which an episode is truncated
 CAMERAS, IMAGE_SIZE = ("wrist", "front"), 84  # the paper's
 PIXELS, STATE = "pixels", "state"
 FREE = "-free"  # of ERJ as the paper's text defines it
-MODES = (*SPACES, ERJ + FREE)
+MODES = (*(space for space in SPACES if AT not in space), ERJ + FREE)  # what an @ adds is no mode of its own
 
 
 def space_name(mode: str) -> str:

@@ -160,6 +160,15 @@ class ArmSpace(ABC):
         """The solutions q (N, n) as functions of the actions, for automatic derivatives; None if there are none."""
         return None
 
+    def steady(self, action: ArrayLike, seed: Vector) -> Vector | None:
+        """Joint angles (n,) [rad] near a seed for an action that says less than it seems to; None if it does not.
+
+        Args:
+            action: (dim,), finite.
+            seed: (n,) [rad] the arm's measured angles.
+        """
+        return None
+
     def ease(self, action: ArrayLike, seed: Vector, within: Vector, current: Vector) -> Vector | None:
         """Joint angles (n,) [rad] near a seed that do as much of an action as lies on the way; None if there are none.
 
