@@ -41,6 +41,7 @@ SPACES = (JOINT, TASK, *REDUNDANCIES)
 RELATIVE: dict[str, type[DeltaSpace]] = {PREFIX: DeltaSpace, CARRIED: CarriedDeltaSpace}  # by the prefix of the name
 
 AT, AND = "@", "+"  # as in erj@panda_joint3, or erj@panda_joint1+panda_joint3 with two redundant joints
+PLAIN = tuple(space for space in SPACES if AT not in space)  # no variants of others
 
 
 def make_arm_space(
