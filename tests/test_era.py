@@ -52,7 +52,7 @@ def test_the_slope_of_the_arm_angle_is_its_derivative(direction: ReferenceDirect
 
 @pytest.mark.parametrize("direction", DIRECTIONS.values(), ids=DIRECTIONS)
 def test_a_reference_is_a_right_handed_frame_across_every_axis(direction: ReferenceDirection) -> None:
-    for axis in Rotation.random(50, rng=0).as_matrix()[:, :, 0]:
+    for axis in Rotation.random(50, rng=np.random.default_rng(0)).as_matrix()[:, :, 0]:
         top, side, spin = direction.of(tuple(axis.tolist()))
         np.testing.assert_allclose(np.cross(top, side), axis, atol=1e-9)
         np.testing.assert_allclose([np.linalg.norm(top), axis @ top, axis @ spin], [1, 0, 0], atol=1e-9)
@@ -197,7 +197,7 @@ def _with_arm_angle(space: ActionSpace, phi: np.ndarray, rng: np.random.Generato
 
 
 def test_a_vertical_axis_is_counted_from_the_base_frames_x():
-    circle = ElbowCircle.through(np.zeros(3), np.array([0.1, 0.1, 0.3]), np.array([0.0, 0.0, 0.6]))
+    circle = ElbowCircle.through((0.0, 0.0, 0.0), (0.1, 0.1, 0.3), (0.0, 0.0, 0.6))
     assert np.isclose(circle.angle, np.radians(45))
     np.testing.assert_allclose(circle.elbow(circle.angle), [0.1, 0.1, 0.3])
 

@@ -71,6 +71,9 @@ class Commander:
     - ``hold``: the last command stands.
     - ``stop``: the last command stands until the next reset.
 
+    An action that determines less than all joints, next to a singularity, moves the others as little as it can
+    (:meth:`ArmSpace.steady`).
+
     An arm that is held up, by what it ran into, is waited for: the last command stands until the arm
     has come near it, or the action leads back.
     """

@@ -47,6 +47,7 @@ class ElbowCircle(NamedTuple):
         shoulder: Components,
         elbow: Components,
         wrist: Components,
+        *,
         direction: ReferenceDirection = UP,
         xp: Any = math,
     ) -> "ElbowCircle":
@@ -117,18 +118,18 @@ class ArmAngle(Redundancy):
 
     def circle(self, q: Vector) -> ElbowCircle:
         """The elbow's circle at q (n,) [rad]."""
-        return ElbowCircle.through(*self._forward.points(q, self.frames).origins, self.direction)
+        return ElbowCircle.through(*self._forward.points(q, self.frames).origins, direction=self.direction)
 
     def wrapped(self, q: Array) -> Vector:
         """Arm angles (N,) [rad] in (-pi, pi] at q (N, n) [rad]."""
-        return ElbowCircle.through(*self._forward.positions(q, self.frames), self.direction, np).angle
+        return ElbowCircle.through(*self._forward.positions(q, self.frames), direction=self.direction, xp=np).angle
 
     def along(self, q: Array) -> Array:
         unwrapped = np.unwrap(np.concatenate([[self.reference], self.wrapped(q)]))[1:]
         return np.asarray(unwrapped, dtype=np.float64)[:, None]
 
     def slope(self, q: Sequence[Any], points: Sequence[Components], xp: Any = math) -> Slope:
-        circle = ElbowCircle.through(*points, self.direction, xp)
+        circle = ElbowCircle.through(*points, direction=self.direction, xp=xp)
         by_elbow, by_wrist = circle.slopes(xp)
         by_shoulder = times(-1.0, plus(by_elbow, by_wrist))
         return Slope((circle.angle,), circle.radius, ((by_shoulder, by_elbow, by_wrist),))

@@ -161,7 +161,9 @@ class ArmSpace(ABC):
         return None
 
     def steady(self, action: ArrayLike, seed: Vector) -> Vector | None:
-        """Joint angles (n,) [rad] near a seed for an action that says less than it seems to; None if it does not.
+        """Joint angles (n,) [rad] that do all an action determines and else stay near a seed.
+
+        None where the action determines all joints, as it nearly always does: they are what it decodes to.
 
         Args:
             action: (dim,), finite.
