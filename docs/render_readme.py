@@ -28,6 +28,7 @@ TABLES = {
     "decodes": "decode",
     "drives": "drift",
     "drifts": "deltas",
+    "elbow_angles": "elbow_angles",
     "round_trips": "round_trips",
     "training_times": "training_time",
     "environment_steps": "throughput",

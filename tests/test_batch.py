@@ -13,7 +13,7 @@ from er_il.support.errors import ShapeError
 
 PANDA, XARM7, PANDA8 = Arm.preset("panda"), Arm.preset("xarm7"), Arm.preset("panda8")
 AGREES = 1e-6  # [rad]
-KINDS = ("joint", "task", "erj", "era", "erx")
+KINDS = ("joint", "task", "erj", "era", "era@stereo", "erx")
 
 
 def sample(space: ArmSpace, count: int, reach: float, seed_error: float = 0.1) -> tuple[Array, Array, Array]:
@@ -24,7 +24,7 @@ def sample(space: ArmSpace, count: int, reach: float, seed_error: float = 0.1) -
     return q, np.array([space.encode(each) for each in q]), q + rng.uniform(-seed_error, seed_error, q.shape)
 
 
-CASES = [(arm, kind) for arm in (PANDA, XARM7, PANDA8) for kind in KINDS if kind != "era" or arm.redundancy == 1]
+CASES = [(arm, kind) for arm in (PANDA, XARM7, PANDA8) for kind in KINDS if "era" not in kind or arm.redundancy == 1]
 
 
 @pytest.mark.parametrize(("arm", "kind"), CASES, ids=lambda value: getattr(value, "name", value))

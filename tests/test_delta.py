@@ -38,7 +38,7 @@ def integrate(space: ActionSpace, actions: np.ndarray, start: np.ndarray, lag: f
     return np.array(path)
 
 
-@pytest.mark.parametrize("kind", ["joint", "erj", "era"])
+@pytest.mark.parametrize("kind", ["joint", "erj", "era", "era@stereo"])
 def test_integrating_a_demos_deltas_returns_to_its_joints(kind):
     q = demo()
     space = delta(kind)

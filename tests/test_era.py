@@ -1,15 +1,23 @@
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 from chains import chain_arm
+from scipy.spatial.transform import Rotation
 
 from er_il import ActionSpace, Arm, Status, from_spec, make_action_space
-from er_il.kinematics.arm_angle import ArmAngle, ElbowCircle
+from er_il.kinematics.arm_angle import STEREO, UP, ArmAngle, ElbowCircle, wrapped
+from er_il.kinematics.reference_direction import ReferenceDirection, Stereographic
+from er_il.kinematics.solver import kinematics_of
 from er_il.spaces.references import fitted
+from er_il.spaces.registry import name_of
 from er_il.spaces.round_trip import EXACT
-from er_il.support.errors import ArmError, SpecError
+from er_il.support.errors import ArmError, SpecError, UnknownNameError
 
 PANDA = Arm.preset("panda")
 ANGLE = ArmAngle(PANDA)
+DIRECTIONS = {"up": UP, "stereo": STEREO, "tilted": Stereographic((0.6, 0.0, 0.8), (0.0, 1.0, 0.0))}
 
 
 def test_the_arm_angle_is_zero_at_the_top_and_follows_the_equation():
@@ -27,14 +35,99 @@ def test_the_arm_angle_is_zero_at_the_top_and_follows_the_equation():
         np.testing.assert_allclose(circle.elbow(circle.angle), elbow, atol=1e-9)
 
 
-def test_the_slope_of_the_arm_angle_is_its_derivative():
-    rng, h = np.random.default_rng(1), 1e-6
-    for _ in range(10):
-        q = rng.uniform(PANDA.lower, PANDA.upper)
-        at = ANGLE.linearise(q)
-        ahead, behind = ANGLE.wrapped(q + h * np.eye(7)), ANGLE.wrapped(q - h * np.eye(7))
-        np.testing.assert_allclose(at.derivative[0], at.scale * (ahead - behind) / (2 * h), atol=1e-6)
-        assert np.isclose(at.values[0], ANGLE.wrapped(q[None])[0], rtol=0, atol=1e-12)
+@pytest.mark.parametrize("direction", DIRECTIONS.values(), ids=DIRECTIONS)
+def test_the_slope_of_the_arm_angle_is_its_derivative(direction: ReferenceDirection) -> None:
+    angle, rng, h = ArmAngle(PANDA, direction=direction), np.random.default_rng(1), 1e-6
+    q = rng.uniform(PANDA.lower, PANDA.upper, (20, PANDA.dof))
+    values, scale, slopes = angle.linearise_batch(kinematics_of(PANDA).chain.walk(q))
+    for row, each in enumerate(q):
+        at = angle.linearise(each)
+        ahead, behind = angle.wrapped(each + h * np.eye(7)), angle.wrapped(each - h * np.eye(7))
+        difference = at.scale * wrapped(ahead - behind) / (2 * h)
+        np.testing.assert_allclose(at.derivative[0], difference, atol=1e-6)
+        np.testing.assert_allclose(slopes[0, :, row], difference, atol=1e-6)
+        assert np.isclose(at.values[0], angle.wrapped(each[None])[0], rtol=0, atol=1e-12)
+        np.testing.assert_allclose([at.values[0], at.scale], [values[0, row], scale[row]], rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("direction", DIRECTIONS.values(), ids=DIRECTIONS)
+def test_a_reference_is_a_right_handed_frame_across_every_axis(direction: ReferenceDirection) -> None:
+    for axis in Rotation.random(50, rng=np.random.default_rng(0)).as_matrix()[:, :, 0]:
+        top, side, spin = direction.of(tuple(axis.tolist()))
+        np.testing.assert_allclose(np.cross(top, side), axis, atol=1e-9)
+        np.testing.assert_allclose([np.linalg.norm(top), axis @ top, axis @ spin], [1, 0, 0], atol=1e-9)
+
+
+def _published_iiwa(path: Path) -> Arm:
+    """The KUKA LBR iiwa 14 of rpiRobotics/stereo-sew: its distances and axes, with more than a turn of every joint."""
+    heights, axes = (0.36, 0, 0.42, 0, 0.4, 0, 0), ("0 0 1", "0 1 0", "0 0 1", "0 -1 0", "0 0 1", "0 1 0", "0 0 1")
+    links = "".join(f'<link name="l{i}"/>' for i in range(8)) + '<link name="tool"/>'
+    joints = "".join(
+        f'<joint name="j{i + 1}" type="revolute"><parent link="l{i}"/><child link="l{i + 1}"/>'
+        f'<origin xyz="0 0 {z}"/><axis xyz="{axis}"/><limit lower="-4" upper="4" effort="10" velocity="2"/></joint>'
+        for i, (z, axis) in enumerate(zip(heights, axes, strict=True))
+    )
+    joints += '<joint name="t" type="fixed"><parent link="l7"/><child link="tool"/><origin xyz="0 0 0.126"/></joint>'
+    path.write_text(f'<robot name="iiwa">{links}{joints}</robot>')
+    return Arm.from_urdf(path, ee_frame="tool")
+
+
+def test_the_published_example_of_the_stereographic_angle_has_its_eight_solutions(tmp_path: Path) -> None:
+    """rpiRobotics/stereo-sew, robot_examples/kuka.m: all of the eight solutions at psi = pi/6 are exact."""
+    arm, psi = _published_iiwa(tmp_path / "iiwa.urdf"), np.pi / 6
+    e_t, e_r = (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)
+    angle, kinematics = ArmAngle(arm, direction=Stereographic(e_t, e_r)), kinematics_of(arm)
+    T_base_ee = np.eye(4)
+    T_base_ee[:3, :3], T_base_ee[:3, 3] = Rotation.from_euler("x", np.pi / 4).as_matrix(), (0.2, 0.3, 0.4)
+
+    # The elbow by the paper's construction, with cross products, and the law of cosines.
+    shoulder = np.array([0, 0, 0.36])
+    span = T_base_ee[:3, 3] - 0.126 * T_base_ee[:3, 2] - shoulder
+    axis = span / np.linalg.norm(span)
+    across = np.cross(np.cross(axis - e_t, e_r), axis)
+    spoke = Rotation.from_rotvec(psi * axis).apply(across / np.linalg.norm(across))
+    foot = (0.42**2 - 0.4**2 + span @ span) / (2 * np.linalg.norm(span))
+    elbow = shoulder + foot * axis + np.sqrt(0.42**2 - foot**2) * spoke
+
+    found, rng = [], np.random.default_rng(0)
+    for _ in range(100):
+        ik = kinematics.solve(T_base_ee, rng.uniform(-np.pi, np.pi, 7), angle, [psi])
+        if ik.status is Status.OK and not any(np.abs(wrapped(ik.q - q)).max() < 1e-3 for q in found):
+            found.append(ik.q)
+            assert max(kinematics.pose_error(T_base_ee, ik.q)) < 1e-6
+            np.testing.assert_allclose(angle.wrapped(ik.q[None]), psi, atol=1e-6)
+            np.testing.assert_allclose(kinematics.frame_pose(ik.q, "l4")[:3, 3], elbow, atol=1e-6)
+    assert len(found) == 8
+
+
+def test_the_stereographic_angle_goes_on_where_the_axis_passes_the_vertical() -> None:
+    """The wrist passes over the shoulder, from ahead to behind: the highest point of the circle changes sides."""
+    q = PANDA.home + np.linspace(0, 1, 200)[:, None] * np.array([0, -1.5, 0.01, 0, 0.01, 0, 0])
+    kinematics = kinematics_of(PANDA)
+    shoulder, _, wrist = (kinematics.fk_batch(q, link)[:, :3, 3] for link in ANGLE.frames)
+    assert np.sign(wrist - shoulder)[[0, -1], 0].tolist() == [1, -1]
+    steps = {
+        name: np.abs(np.diff(make_action_space(name, PANDA).encode(q)[:, 7])).max() for name in ("era", "era@stereo")
+    }
+    assert steps["era@stereo"] < 0.05 < 0.5 < steps["era"]
+
+
+@pytest.mark.parametrize("name", ["era@stereo", "delta_era@stereo"])
+def test_a_space_with_the_stereographic_reference_comes_back_from_its_spec(name: str) -> None:
+    space = make_action_space(name, PANDA)
+    spec = json.loads(json.dumps(space.spec()))
+    again = from_spec(spec)
+    assert (name_of(again.arm_space, PANDA), again.names) == (name, space.names)
+    q = PANDA.home + 0.2 * np.sin(np.arange(7) + np.linspace(0, 1, 30)[:, None])
+    np.testing.assert_array_equal(again.encode(q), space.encode(q))
+    assert not np.allclose(make_action_space(name.removesuffix("@stereo"), PANDA).encode(q), space.encode(q), atol=1e-3)
+    with pytest.raises(SpecError, match=r"^The action spec measures the arm angle by .*1\.0, 0\.0.*, but 'panda' by "):
+        from_spec({**spec, "arm_angle": {**spec["arm_angle"], "e_t": [1.0, 0.0, 0.0]}})
+
+
+def test_a_reference_that_the_arm_angle_does_not_have_is_refused() -> None:
+    with pytest.raises(UnknownNameError, match=r"^Unknown action space 'era@down'\. Valid: .*era@stereo"):
+        make_action_space("era@down", PANDA)
 
 
 def test_the_commanded_arm_angle_is_reached_although_the_wrist_moves_with_it():
@@ -104,7 +197,7 @@ def _with_arm_angle(space: ActionSpace, phi: np.ndarray, rng: np.random.Generato
 
 
 def test_a_vertical_axis_is_counted_from_the_base_frames_x():
-    circle = ElbowCircle.through(np.zeros(3), np.array([0.1, 0.1, 0.3]), np.array([0.0, 0.0, 0.6]))
+    circle = ElbowCircle.through((0.0, 0.0, 0.0), (0.1, 0.1, 0.3), (0.0, 0.0, 0.6))
     assert np.isclose(circle.angle, np.radians(45))
     np.testing.assert_allclose(circle.elbow(circle.angle), [0.1, 0.1, 0.3])
 

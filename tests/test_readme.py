@@ -26,6 +26,7 @@ def test_the_pages_tables_are_rendered_from_the_results() -> None:
         "results/joints",
         "results/validity",
         "results/deltas",
+        "results/elbow_angle",
         "results/panda8",
         "results/training_time",
     } <= set(found)

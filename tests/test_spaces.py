@@ -34,7 +34,10 @@ def test_joint_space_returns_the_joints_always():
 
 
 @pytest.mark.parametrize("rotation", ["quat", "rot6d"])
-@pytest.mark.parametrize(("kind", "seed_error", "share"), [("erj", 0.1, 0.98), ("era", 0.1, 0.98), ("erj", 0.03, 0.99)])
+@pytest.mark.parametrize(
+    ("kind", "seed_error", "share"),
+    [("erj", 0.1, 0.98), ("era", 0.1, 0.98), ("era@stereo", 0.1, 0.98), ("erj", 0.03, 0.99)],
+)
 def test_er_spaces_return_the_joints(kind, seed_error, share, rotation):
     space = make_action_space(kind, PANDA, rotation=rotation)
     assert_returns_joints(space, round_trips(space.arm_space, 500, seed_error=seed_error), share)
@@ -138,7 +141,9 @@ def test_wrong_shapes_are_refused_with_what_was_expected():
 
 
 def test_unknown_space_names_the_valid_ones():
-    with pytest.raises(UnknownNameError, match=r"^Unknown action space 'ik'\. Valid: joint, task, erj, era, erx, "):
+    with pytest.raises(
+        UnknownNameError, match=r"^Unknown action space 'ik'\. Valid: joint, task, erj, era, era@stereo, erx, delta_"
+    ):
         make_action_space("ik", PANDA)
 
 

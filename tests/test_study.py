@@ -13,8 +13,11 @@ from er_il import Arm, Status
 from er_il.cli import main
 from er_il.control.commander import Commander
 from er_il.datasets.joint_paths import JointPath
+from er_il.experiments.studies.elbow_angle import elbow_speed
 from er_il.experiments.studies.prediction import predict, read_training
 from er_il.experiments.studies.validity import SIZES, Condition, measure, study_validity
+from er_il.kinematics.redundancy import JointAngle
+from er_il.kinematics.solver import kinematics_of
 from er_il.report.joints import notes
 from er_il.spaces.joint_choice import choices
 from er_il.spaces.registry import make_arm_space
@@ -204,7 +207,7 @@ def test_the_studies_run_on_recorded_demonstrations(tmp_path, monkeypatch, capsy
     assert report["meta"]["versions"]["placo"]
     assert "redundancy lies among the joints that twist" in capsys.readouterr().out.replace("\n", " ")
     # The demonstrations are there already: the other studies find them where they would record them.
-    for study in ("validity", "deltas", "margins"):
+    for study in ("validity", "deltas", "margins", "elbow_angle"):
         shutil.copytree("joints/demos", f"{study}/demos")
     study_validity = documented("docs/choosing.md", "er-il study validity")
     run(monkeypatch, *study_validity, "--episodes", 1, "--samples", 1, "--out", "validity")
@@ -214,6 +217,12 @@ def test_the_studies_run_on_recorded_demonstrations(tmp_path, monkeypatch, capsy
     assert max(drifts[space]["joints"] for space in ("joint", "erj", "era", "erx")) < 1e-3 < drifts["task"]["joints"]
     assert max(each["position"] for each in drifts.values()) < 1e-4
     assert not any(each["invalid"] for each in drifts.values())
+    study_elbow_angle = documented("docs/choosing.md", "er-il study elbow_angle")
+    run(monkeypatch, *study_elbow_angle, "--episodes", 1, "--out", "elbow_angle")
+    erj, era, stereo = json.loads(Path("elbow_angle/report.json").read_text())["elbow_angles"]
+    assert [each["space"] for each in (erj, era, stereo)] == ["erj", "era", "era@stereo"]
+    assert erj["near_singular"] == 0 < 0.9 * era["elbow_still"] < era["near_singular"]
+    assert era["commanded"]["joints"][1] < 0.5 < era["decoded"]["joints"][1]
     report = json.loads((tmp_path / "validity/report.json").read_text())
     assert report["meta"]["demos"] == {"reach_cup": 1}
     run(monkeypatch, *documented("docs/choosing.md", "er-il study margins"), "--episodes", 1, "--out", "margins")
@@ -223,6 +232,20 @@ def test_the_studies_run_on_recorded_demonstrations(tmp_path, monkeypatch, capsy
     assert margins["panda_joint4"]["folds"] > 0 == fitted["folds"]
     for picture in ("joints/joints.png", "validity/validity.png", "margins/margins.png"):
         assert (tmp_path / picture).read_bytes()[:4] == b"\x89PNG"
+
+
+def test_an_upright_upper_arm_leaves_the_elbow_where_it_is() -> None:
+    """Its self-motion is joint 1 against joint 3; elsewhere it moves the elbow as far as inverse kinematics says."""
+    kinematics = kinematics_of(PANDA)
+    upright, other = PANDA.home.copy(), PANDA.home + 0.3
+    upright[1] = 0.0
+    still, speed = elbow_speed(kinematics, "panda_link4", np.array([upright, other]))
+    assert still < 1e-9
+    moved = kinematics.solve(kinematics.fk(other), other, JointAngle(PANDA, ("panda_joint1",)), [other[0] + 1e-4]).q
+    way = np.linalg.norm(
+        kinematics.frame_pose(moved, "panda_link4")[:3, 3] - kinematics.frame_pose(other, "panda_link4")[:3, 3]
+    )
+    assert speed == pytest.approx(way / np.linalg.norm(moved - other), rel=1e-2)
 
 
 @pytest.mark.parametrize(

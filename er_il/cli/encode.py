@@ -26,7 +26,8 @@ def encode(
 
     Args:
         source: Folder of the dataset, or its repository id on the hub.
-        to: joint, task, erj, era or erx; joint goes back through the decoder to the robot's own joint values.
+        to: joint, task, erj, era, era@stereo or erx; joint goes back through the decoder to the robot's own joint
+            values.
         out: Folder of the new dataset.
         robot: The arm of a dataset that does not know it.
         redundant: Joints of the URDF that erj commands; the first ones if omitted.

@@ -26,7 +26,7 @@ def generate(
     Args:
         task: Task, such as reach_cup.
         spaces: Action spaces, separated by commas: joint, task, erj, era, erx, or erj@JOINT to command another
-            joint.
+            joint, era@stereo for another reference of the arm angle.
             They name the datasets' folders.
         episodes: Number of demonstrations.
         seed: Seed of the demonstrations.

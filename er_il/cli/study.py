@@ -141,11 +141,30 @@ def margins(study: OmitArgPrefixes[StudyOptions]) -> None:
     study.run("margins", measure, shown, margins_figure)
 
 
+def elbow_angle(study: OmitArgPrefixes[StudyOptions]) -> None:
+    """What does the arm angle say of the joints? ERA with both references beside ERJ, with errors like a policy's.
+
+    Args:
+        study: Demonstrations and results.
+    """
+    study.check()
+    from er_il.experiments.studies.elbow_angle import study_elbow_angle
+    from er_il.report.tables import terminal_table
+    from er_il.report.text import table
+    from er_il.support.workers import cores
+
+    def measure(arm: "Arm", demos: "Demos", advance: Callable[[int, int], object]) -> dict[str, Any]:
+        return study_elbow_angle(arm, demos, cores(), advance)
+
+    study.run("elbow_angle", measure, lambda report: [terminal_table(table("elbow_angles", **report))])
+
+
 Study = (
     Annotated[Any, subcommand("validity", constructor=validity, prefix_name=False)]
     | Annotated[Any, subcommand("joints", constructor=joints, prefix_name=False)]
     | Annotated[Any, subcommand("deltas", constructor=deltas, prefix_name=False)]
     | Annotated[Any, subcommand("margins", constructor=margins, prefix_name=False)]
+    | Annotated[Any, subcommand("elbow_angle", constructor=elbow_angle, prefix_name=False)]
 )
 
 

@@ -71,6 +71,9 @@ class Commander:
     - ``hold``: the last command stands.
     - ``stop``: the last command stands until the next reset.
 
+    An action that determines less than all joints, next to a singularity, moves the others as little as it can
+    (:meth:`ArmSpace.steady`).
+
     An arm that is held up, by what it ran into, is waited for: the last command stands until the arm
     has come near it, or the action leads back.
     """
@@ -174,8 +177,11 @@ class Commander:
         return replace(decoded, status=Status.JUMP) if jumps else decoded
 
     def _eased(self, decoded: IkResult, action: ArrayLike, q: ArrayLike) -> Vector:
-        """The decoded joints or, if they are far, as much of the action as lies near with its pose."""
+        """The decoded joints or, if they are far or not what the action is about, those near that have its pose."""
         measured = np.asarray(q, dtype=np.float64)
+        steady = self.space.steady(action, measured)
+        if steady is not None and not self._far(steady, measured):
+            return steady
         if not self._far(decoded.q, measured):
             return decoded.q
         eased = self.space.ease(action, measured, JUMP_PERIODS * self._reach, self.last)

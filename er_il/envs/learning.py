@@ -19,7 +19,7 @@ from er_il.kinematics.solver import Status
 from er_il.spaces.carried import CARRIED
 from er_il.spaces.delta import PREFIX, DeltaBounds, DeltaSpace
 from er_il.spaces.joint import JOINT
-from er_il.spaces.registry import AT, CARRIERS, ERJ, SPACES, make_arm_space
+from er_il.spaces.registry import AT, CARRIERS, ERJ, PLAIN, make_arm_space
 from er_il.support.episode_end import Step
 from er_il.support.errors import UnknownNameError
 from er_il.support.vectors import named_vector
@@ -30,7 +30,7 @@ SUCCESSES, INVALIDS = 10, 5  # in a row, after which an episode is truncated
 CAMERAS, IMAGE_SIZE = ("wrist", "front"), 84  # the paper's
 PIXELS, STATE = "pixels", "state"
 FREE = "-free"  # of ERJ as the paper's text defines it, and likewise of ERX
-MODES = (*SPACES, *(space + FREE for space in CARRIERS))
+MODES = (*PLAIN, *(space + FREE for space in CARRIERS))
 
 
 def space_name(mode: str) -> str:

@@ -30,8 +30,8 @@ class ErIlEnvConfig(EnvConfig):
     """A simulated task whose actions are encoded in an action space.
 
     Attributes:
-        action_space: ``joint``, ``task``, ``erj``, ``era``, or ``erj@<joint>`` if ERJ commands another joint;
-            with ``delta_`` in front, changes of its commands.
+        action_space: ``joint``, ``task``, ``erj``, ``era``, or ``erj@<joint>`` if ERJ commands another joint,
+            ``era@stereo`` with another reference of the arm angle; with ``delta_`` in front, changes of its commands.
         resolution: What IK does with the freedom that task space leaves: ``nearest``, ``posture`` or ``clear``.
         posture: Joint angles [rad] to which ``posture`` pulls; the arm's comfortable ones if empty.
         rotation: ``quat`` or ``rot6d``, as in the dataset that the policy was trained on.

@@ -37,7 +37,8 @@ def evaluate(
     Args:
         policy: Folder of the pretrained policy.
         task: Name of the task.
-        decoder_name: ``joint``, ``task-nearest``, ``task-posture``, ``task-clear``, ``erj``, ``era``, ``erj@JOINT``.
+        decoder_name: ``joint``, ``task-nearest``, ``task-posture``, ``task-clear``, ``erj``, ``era``, ``erx``,
+            ``erj@JOINT``, ``era@stereo``.
         episodes: Number of rollouts.
         seed: Seed of the first one; the same seed is the same initial state for every decoder.
         on_invalid: See :class:`er_il.control.commander.Commander`.

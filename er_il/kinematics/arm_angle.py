@@ -4,11 +4,8 @@
 
 The axis a points from the shoulder S to the wrist W. c_E is the elbow's foot on it, t_E points from
 there to the highest point of the circle, and b_E = a x t_E; so phi = 0 at the top and phi grows
-with a right-handed turn about the axis. High is along the base frame's z.
-
-Where the axis is vertical, no point of the circle is the highest and phi has no meaning. Within
-``VERTICAL`` of it phi is counted from the base frame's x instead, which keeps it finite; it jumps
-on the way in and out, so an arm should not work there.
+with a right-handed turn about the axis. High is along the base frame's z. Other choices of t_E, which are
+singular elsewhere: :mod:`er_il.kinematics.reference_direction`.
 """
 
 import math
@@ -19,13 +16,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from er_il.arms.arm import Arm, Vector
-from er_il.kinematics.components import Components, at_least, cross, dot, length, minus, plus, select, times
+from er_il.kinematics.components import Components, at_least, dot, length, minus, plus, times
 from er_il.kinematics.redundancy import Array, Redundancy, Slope
+from er_il.kinematics.reference_direction import TINY, ReferenceDirection, Stereographic, Up
 from er_il.support.errors import ArmError, SpecError
 
-VERTICAL = 1e-3  # [rad] closer than this to the vertical, the axis counts as vertical
 MARGIN = 0.2  # cosine of the distance from the turn opposite to the reference, within which turns are in doubt
-TINY = 1e-9  # [m] a circle smaller than this is a point
+UP, STEREO = Up(), Stereographic()
 
 
 class ElbowCircle(NamedTuple):
@@ -41,28 +38,30 @@ class ElbowCircle(NamedTuple):
     radius: Any  # [m] r_E
     top: Components  # t_E, unit
     side: Components  # b_E, unit
-    rise: Any  # cosine between the axis and what ``top`` is the projection of: up, or forward where it is vertical
+    spin: Components  # derivative of the turn of ``top`` about the axis by the axis
     angle: Any  # [rad] phi in (-pi, pi]
 
     @classmethod
-    def through(cls, shoulder: Components, elbow: Components, wrist: Components, xp: Any = math) -> "ElbowCircle":
+    def through(
+        cls,
+        shoulder: Components,
+        elbow: Components,
+        wrist: Components,
+        *,
+        direction: ReferenceDirection = UP,
+        xp: Any = math,
+    ) -> "ElbowCircle":
         """The circle of three points [m]; ``xp``: functions for the components' type, ``math`` or an array library."""
         span = minus(wrist, shoulder)
         reach = at_least(TINY, length(span, xp), xp)
         axis = times(1.0 / reach, span)
-        x, y, z = axis
-        upright = x * x + y * y <= VERTICAL**2
-        rise = select(upright, x, z, xp)
-        from_top = select(upright, 1.0, 0.0, xp), 0.0 * rise, select(upright, 0.0, 1.0, xp)
-        projected = minus(from_top, times(rise, axis))
-        top = times(1.0 / length(projected, xp), projected)
-        side = cross(axis, top)
+        top, side, spin = direction.of(axis, xp)
         arm = minus(elbow, shoulder)
         foot = dot(arm, axis)
         spoke = minus(arm, times(foot, axis))
         radius = at_least(TINY, length(spoke, xp), xp)
         angle = xp.atan2(dot(spoke, side), dot(spoke, top))
-        return cls(shoulder, axis, reach, foot, radius, top, side, rise, angle)
+        return cls(shoulder, axis, reach, foot, radius, top, side, spin, angle)
 
     def elbow(self, angle: float) -> Array:
         """Elbow position (3,) [m] at an arm angle [rad]: the equation above."""
@@ -76,9 +75,9 @@ class ElbowCircle(NamedTuple):
         Lengths along the circle, not angles: these stay finite where the circle shrinks to a point.
         """
         tangent = minus(times(xp.cos(self.angle), self.side), times(xp.sin(self.angle), self.top))
-        # Turning the axis carries the circle's centre along, and turns the highest point about the axis.
-        twist = self.radius * self.rise / xp.sqrt(at_least(TINY, 1.0 - self.rise * self.rise, xp))
-        return tangent, times(1.0 / self.reach, minus(times(twist, self.side), times(self.foot, tangent)))
+        # Turning the axis carries the circle's centre along, and turns the reference about the axis.
+        turned = plus(times(self.radius, self.spin), times(self.foot, tangent))
+        return tangent, times(-1.0 / self.reach, turned)
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +91,7 @@ class ArmAngle(Redundancy):
     """
 
     reference: float = 0.0  # [rad]
+    direction: ReferenceDirection = UP
 
     def __post_init__(self) -> None:
         if self.arm.angle_frames is None:
@@ -101,9 +101,10 @@ class ArmAngle(Redundancy):
             )
 
     @classmethod
-    def from_home(cls, arm: Arm) -> "ArmAngle":
+    def from_home(cls, arm: Arm, direction: ReferenceDirection = UP) -> "ArmAngle":
         """The arm angle counted from the turn of the arm's home posture."""
-        return cls(arm, float(cls(arm).wrapped(arm.home[None])[0]))
+        angle = cls(arm, direction=direction)
+        return replace(angle, reference=float(angle.wrapped(arm.home[None])[0]))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -117,18 +118,18 @@ class ArmAngle(Redundancy):
 
     def circle(self, q: Vector) -> ElbowCircle:
         """The elbow's circle at q (n,) [rad]."""
-        return ElbowCircle.through(*self._forward.points(q, self.frames).origins)
+        return ElbowCircle.through(*self._forward.points(q, self.frames).origins, direction=self.direction)
 
     def wrapped(self, q: Array) -> Vector:
         """Arm angles (N,) [rad] in (-pi, pi] at q (N, n) [rad]."""
-        return ElbowCircle.through(*self._forward.positions(q, self.frames), xp=np).angle
+        return ElbowCircle.through(*self._forward.positions(q, self.frames), direction=self.direction, xp=np).angle
 
     def along(self, q: Array) -> Array:
         unwrapped = np.unwrap(np.concatenate([[self.reference], self.wrapped(q)]))[1:]
         return np.asarray(unwrapped, dtype=np.float64)[:, None]
 
     def slope(self, q: Sequence[Any], points: Sequence[Components], xp: Any = math) -> Slope:
-        circle = ElbowCircle.through(*points, xp=xp)
+        circle = ElbowCircle.through(*points, direction=self.direction, xp=xp)
         by_elbow, by_wrist = circle.slopes(xp)
         by_shoulder = times(-1.0, plus(by_elbow, by_wrist))
         return Slope((circle.angle,), circle.radius, ((by_shoulder, by_elbow, by_wrist),))
@@ -146,7 +147,8 @@ class ArmAngle(Redundancy):
 
     def details(self) -> dict[str, Any]:
         assert self.arm.angle_frames is not None
-        return {"arm_angle": {**asdict(self.arm.angle_frames), "reference": self.reference}}
+        frames = asdict(self.arm.angle_frames)
+        return {"arm_angle": {**frames, **self.direction.details(), "reference": self.reference}}
 
     def restored(self, spec: Mapping[str, Any]) -> "ArmAngle":
         described = spec["arm_angle"]

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, Field, StrictInt, StrictStr
 
 from er_il.datasets.schema import IMAGES
-from er_il.spaces.registry import split_name
+from er_il.spaces.registry import AT, split_name
 from er_il.support.declaration import check_values, read_yaml
 from er_il.support.errors import PolicyError
 from er_il.support.resources import data_dir
@@ -16,7 +16,7 @@ from er_il.support.resources import data_dir
 def default_config(space: str, kind: str = "") -> Path:
     """Return the configuration that ships for a space: from states, or another kind, such as ``images_small``."""
     suffix = f"_{kind}" if kind else ""
-    return data_dir("configs") / f"act_{split_name(space)[0]}{suffix}.yaml"
+    return data_dir("configs") / f"act_{split_name(space)[0].partition(AT)[0]}{suffix}.yaml"
 
 
 class _Input(BaseModel):

@@ -160,6 +160,17 @@ class ArmSpace(ABC):
         """The solutions q (N, n) as functions of the actions, for automatic derivatives; None if there are none."""
         return None
 
+    def steady(self, action: ArrayLike, seed: Vector) -> Vector | None:
+        """Joint angles (n,) [rad] that do all an action determines and else stay near a seed.
+
+        None where the action determines all joints, as it nearly always does: they are what it decodes to.
+
+        Args:
+            action: (dim,), finite.
+            seed: (n,) [rad] the arm's measured angles.
+        """
+        return None
+
     def ease(self, action: ArrayLike, seed: Vector, within: Vector, current: Vector) -> Vector | None:
         """Joint angles (n,) [rad] near a seed that do as much of an action as lies on the way; None if there are none.
 

@@ -16,11 +16,13 @@ from er_il.kinematics.rotation import Quaternion, RotationCode, RotationError
 from er_il.kinematics.search import FAR
 from er_il.kinematics.solver import IkResult, Kinematics, Status, kinematics_of
 from er_il.spaces.base import ArmSpace, Array
+from er_il.spaces.round_trip import SINGULAR
 
 POSITION_NAMES = ("ee.x", "ee.y", "ee.z")
 TASK = "task"
 IDENTITY = np.eye(4)
 EASED = (0.5, 0.2, 0.1, 0.0)  # shares of the way to a redundancy value that is too far
+SLACK = 1e-2  # [m, of an unscaled value rad] a value so near the present one may wait while it is next to a singularity
 POSTURE_PULL = 0.05  # [rad] of the joint farthest from the posture; at 20 Hz, half a Panda's full speed
 
 
@@ -79,6 +81,27 @@ class PoseSpace(ArmSpace):
         way = self.posture - seed
         share = min(1.0, POSTURE_PULL / max(float(np.max(np.abs(way))), POSTURE_PULL))
         return self.kinematics.solve(T_base_ee, seed, self.redundancy, values, posture=seed + share * way)
+
+    def steady(self, action: ArrayLike, seed: Vector) -> Vector | None:
+        """Meet the pose without self-motion, where the redundancy's values hardly see it.
+
+        Next to a singularity of ERA (on a Panda: the upper arm upright, so that joints 1 and 3 turn it about one axis)
+        self-motion leaves the elbow where it is. A value that is off by a hundredth of a radian, as a policy's is, then
+        asks for tenths of a radian of self-motion, which delay the hand and take joints to where no demonstration was,
+        for millimetres of the elbow. The value is followed again once the arm leaves the singularity, or if it asks for
+        more than ``SLACK``. ERJ has no part in this: its joints are held at their values, and nothing else is free.
+        """
+        redundancy = self.redundancy
+        if redundancy is None or redundancy.held:
+            return None
+        start = self.arm.within_limits(seed)
+        T_base_ee, values = self.split(np.asarray(action, dtype=np.float64))
+        present = redundancy.linearise(start)
+        way = present.scale * redundancy.difference(present.values, values)
+        if np.abs(way).max() > SLACK or self.conditioning(start) >= SINGULAR:
+            return None
+        ik = self.kinematics.solve(T_base_ee, start)
+        return ik.q if ik.status is Status.OK else None
 
     def ease(self, action: ArrayLike, seed: Vector, within: Vector, current: Vector) -> Vector | None:
         return self.ease_pose(*self.split(np.asarray(action, dtype=np.float64)), seed, within)

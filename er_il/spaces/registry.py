@@ -2,12 +2,14 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 from er_il.arms.arm import Arm, Vector, Weights
-from er_il.kinematics.arm_angle import ArmAngle
+from er_il.kinematics.arm_angle import STEREO, UP, ArmAngle
 from er_il.kinematics.linear_coordinates import SPEC_KEY, LinearCoordinates
 from er_il.kinematics.redundancy import JointAngle, Redundancy
+from er_il.kinematics.reference_direction import ReferenceDirection
 from er_il.kinematics.rotation import Quaternion, RotationCode, make_rotation
 from er_il.kinematics.solver import kinematics_of
 from er_il.spaces.base import ArmSpace
@@ -25,20 +27,21 @@ def _joint_angle(arm: Arm) -> Redundancy:
     return JointAngle(arm, arm.redundant)
 
 
-def _arm_angle(arm: Arm) -> Redundancy:
+def _arm_angle(direction: ReferenceDirection, arm: Arm) -> Redundancy:
     if arm.redundancy > 1:
         raise ArmError(f"{arm.name} has {arm.redundancy} redundant joints; one arm angle fixes only one. Use erj.")
-    return ArmAngle.from_home(arm)
+    return ArmAngle.from_home(arm, direction)
 
 
 def _linear_coordinates(arm: Arm) -> Redundancy:
     return LinearCoordinates(arm, arm.weights or home_weights(arm))
 
 
-ERJ, ERA, ERX = "erj", "era", "erx"
+ERJ, ERA, ERA_STEREO, ERX = "erj", "era", "era@stereo", "erx"
 REDUNDANCIES: dict[str, Callable[[Arm], Redundancy]] = {  # of the ER spaces
     ERJ: _joint_angle,
-    ERA: _arm_angle,
+    ERA: partial(_arm_angle, UP),
+    ERA_STEREO: partial(_arm_angle, STEREO),
     ERX: _linear_coordinates,
 }
 CARRIERS = (ERJ, ERX)  # whose changes can carry the pose's target along
@@ -47,6 +50,7 @@ RELATIVE: dict[str, type[DeltaSpace]] = {PREFIX: DeltaSpace, CARRIED: CarriedDel
 
 AT, AND = "@", "+"  # as in erj@panda_joint3, or erj@panda_joint1+panda_joint3 with two redundant joints
 THEN = ":"  # between the weights of a row, as in erx@0.8:-0.6:0:0:0:0:0
+PLAIN = tuple(space for space in SPACES if AT not in space)  # no variants of others
 
 
 def make_arm_space(
@@ -63,7 +67,8 @@ def make_arm_space(
         name: ``joint``, ``task``, ``erj``, ``era`` or ``erx``; with ``delta_`` in front, changes of its commands, and
             with ``carried_`` such that the pose's target moves along with ERJ's joint or ERX's coordinates
             (:mod:`er_il.spaces.carried`). ``erj@<joint>`` commands another than the arm's default joint; several are
-            joined by ``+``. ``erx@<weights>`` has other weights than the arm's (:func:`erx_name`).
+            joined by ``+``. ``era@stereo`` counts the arm angle from the stereographic reference. ``erx@<weights>`` has
+            other weights than the arm's (:func:`erx_name`).
         arm: The arm it commands.
         rotation: ``quat`` or ``rot6d``; the quaternion's hemisphere is that of the arm's home pose.
             Deltas always use a rotation vector.
@@ -90,7 +95,8 @@ def split_name(name: str) -> tuple[str, tuple[str, ...]]:
     Raises:
         UnknownNameError: no such kind, or joints or weights for a kind that has none.
     """
-    kind, at, said = name.partition(AT)
+    of_reference = _split_kind(name)[1] == ERA_STEREO
+    kind, at, said = (name, "", "") if of_reference else name.partition(AT)
     prefix, absolute = _split_kind(kind)
     if absolute not in SPACES or (prefix == CARRIED and absolute not in CARRIERS):
         deltas = [*(PREFIX + space for space in SPACES), *(CARRIED + space for space in CARRIERS)]

@@ -10,7 +10,7 @@ from er_il.experiments.studies import Advance, Demos
 from er_il.kinematics.solver import Status, kinematics_of
 from er_il.spaces.base import Array
 from er_il.spaces.delta import PREFIX, DeltaSpace
-from er_il.spaces.registry import SPACES, make_arm_space
+from er_il.spaces.registry import PLAIN, make_arm_space
 from er_il.support.workers import run_jobs
 
 
@@ -27,7 +27,7 @@ def study_deltas(arm: Arm, demos: Demos, advance: Advance) -> dict[str, Any]:
         ArmError: an ER space does not suit the arm.
     """
     paths = [path.commanded for of_set in demos.values() for path in of_set]
-    return {"drifts": run_jobs([(_drift, make_arm_space(PREFIX + kind, arm), paths) for kind in SPACES], 1, advance)}
+    return {"drifts": run_jobs([(_drift, make_arm_space(PREFIX + kind, arm), paths) for kind in PLAIN], 1, advance)}
 
 
 def _drift(space: DeltaSpace, demos: Sequence[Array]) -> dict[str, Any]:
