@@ -11,7 +11,7 @@ from er_il.report.tables import markdown_table
 from er_il.report.text import Report, sentences, table
 
 PRESET, FITTED = "erx", "erx (fitted)"  # ERX with the arm's own weights, and with those fitted to the demonstrations
-SPECIAL = ("era", PRESET, FITTED)  # spaces of the report that command no joints
+SPECIAL = ("era", "era@stereo", PRESET, FITTED)  # spaces of the report that command no joints
 
 
 def by_demos(report: Report) -> dict[str, dict[str, Report]]:

@@ -11,7 +11,7 @@ from er_il.spaces.demo_margins import margins_along, motion_measured
 from er_il.spaces.joint_choice import choices
 from er_il.spaces.margin import demonstrated_weights, home_weights
 from er_il.spaces.pose import PoseSpace
-from er_il.spaces.registry import AND, AT, ERA, ERJ, erx_name, make_arm_space
+from er_il.spaces.registry import AND, AT, ERA, ERA_STEREO, ERJ, erx_name, make_arm_space
 from er_il.support.workers import run_jobs
 
 
@@ -53,7 +53,7 @@ def _spaces(arm: Arm, every: Sequence[tuple[str, ...]], weights: dict[str, Weigh
     """Names of the spaces by their labels."""
     found = {AND.join(choice): ERJ + AT + AND.join(choice) for choice in every}
     if arm.redundancy == 1 and arm.angle_frames is not None:
-        found[ERA] = ERA
+        found |= {ERA: ERA, ERA_STEREO: ERA_STEREO}
     return found | {label: erx_name(each) for label, each in weights.items()}
 
 
