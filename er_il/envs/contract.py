@@ -17,6 +17,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, Field, StrictInt, StrictStr
 
+from er_il.envs.origin import policy_file, training_info
 from er_il.envs.trust import POSTPROCESSOR, check_steps, read_processor
 from er_il.kinematics.rotation import Quaternion
 from er_il.spaces.base import ArmSpace
@@ -77,15 +78,6 @@ class Contract:
         return PREFIX + "/".join(getattr(self, part.name) for part in fields(self))
 
 
-def dataset_info(root: str | Path) -> dict[str, Any]:
-    """Read the ``meta/info.json`` of a LeRobot dataset.
-
-    Raises:
-        DatasetError: there is no dataset at ``root``.
-    """
-    return read_json(Path(root) / "meta" / "info.json", DatasetError)
-
-
 def policy_contract(policy: str | Path) -> Contract:
     """Find out what a policy's actions mean.
 
@@ -98,7 +90,7 @@ def policy_contract(policy: str | Path) -> Contract:
     Raises:
         PolicyError: the policy is missing or declares nothing.
     """
-    declared = _of_dataset(Path(policy)) or Contract.of_tags(_tags(policy))
+    declared = _of_dataset(policy) or Contract.of_tags(policy_tags(policy))
     if declared is None:
         raise PolicyError(
             f"The policy {policy} does not say which action space it was trained for. Train it with a tag such as "
@@ -160,25 +152,34 @@ def read_policy_config(policy: Path) -> dict[str, Any]:
 
 
 def decodes(policy: str | Path) -> bool:
-    """True if a policy in a folder decodes its actions by itself (see :mod:`er_il.robots.attachment`)."""
-    path = Path(policy) / POSTPROCESSOR
-    if not path.is_file():
+    """True if a policy decodes its actions by itself (see :mod:`er_il.robots.attachment`).
+
+    Args:
+        policy: Folder of a pretrained policy, or its Hub id.
+
+    Raises:
+        PolicyError: its post-processor is damaged, or the Hub has no such policy.
+    """
+    path = policy_file(policy, POSTPROCESSOR)
+    if path is None:
         return False  # LeRobot says what is missing
     return any(step.get("registry_name") == DECODE_POLICY_ACTION for step in read_processor(path)["steps"])
 
 
-def _of_dataset(policy: Path) -> Contract | None:
-    path = policy / "train_config.json"
-    if not path.is_file():
-        return None
+def _of_dataset(policy: str | Path) -> Contract | None:
     try:
-        root = read_json(path, PolicyError)["dataset"]["root"]
-        return Contract.of_spec(action_spec(dataset_info(root)["features"])) if root else None
-    except (OSError, KeyError, TypeError, AttributeError, DatasetError):
-        return None  # trained elsewhere, or the dataset has moved: the tag has to do
+        info = training_info(policy)
+        return Contract.of_spec(action_spec(info["features"])) if info else None
+    except (KeyError, TypeError, AttributeError, DatasetError):
+        return None  # damaged, or it does not say what its actions mean: the tag has to do
 
 
-def _tags(policy: str | Path) -> list[str] | None:
+def policy_tags(policy: str | Path) -> list[str] | None:
+    """Read the tags of a policy, in a folder or on the Hub.
+
+    Raises:
+        PolicyError: there is no such policy, or its configuration is damaged.
+    """
     try:
         if (config := Path(policy) / "config.json").is_file():
             return read_policy_config(config.parent).get("tags")
