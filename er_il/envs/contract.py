@@ -17,7 +17,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, Field, StrictInt, StrictStr
 
-from er_il.envs.origin import policy_file, training_info
+from er_il.envs.origin import CONFIG, policy_file, training_info
 from er_il.envs.trust import POSTPROCESSOR, check_steps, read_processor
 from er_il.kinematics.rotation import Quaternion
 from er_il.spaces.base import ArmSpace
@@ -139,13 +139,15 @@ class _PolicyConfig(BaseModel):
     tags: list[StrictStr] | None = None
 
 
-def read_policy_config(policy: Path) -> dict[str, Any]:
-    """Read the ``config.json`` of a policy in a folder.
+def read_policy_config(policy: str | Path) -> dict[str, Any]:
+    """Read the ``config.json`` of a policy, in a folder or on the Hub.
 
     Raises:
         PolicyError: it is missing or damaged.
     """
-    path = policy / "config.json"
+    path = policy_file(policy, CONFIG)
+    if path is None:
+        raise PolicyError(f"No policy at {policy}: it has no {CONFIG}.")
     config = read_json(path, PolicyError)
     check_values(_PolicyConfig, config, path, PolicyError)
     return config
@@ -180,11 +182,4 @@ def policy_tags(policy: str | Path) -> list[str] | None:
     Raises:
         PolicyError: there is no such policy, or its configuration is damaged.
     """
-    try:
-        if (config := Path(policy) / "config.json").is_file():
-            return read_policy_config(config.parent).get("tags")
-        from lerobot.configs import PreTrainedConfig  # seconds of imports that a folder does without
-
-        return PreTrainedConfig.from_pretrained(policy).tags
-    except (OSError, ValueError) as error:  # huggingface_hub's errors derive from these
-        raise PolicyError(f"No policy at {policy}: {str(error).splitlines()[0]}") from error
+    return read_policy_config(policy).get("tags")

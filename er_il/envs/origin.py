@@ -7,6 +7,7 @@ from er_il.support.errors import DatasetError, PolicyError
 from er_il.support.json_files import read_json
 
 INFO = "meta/info.json"  # of a LeRobot dataset
+CONFIG = "config.json"  # of a policy
 TRAINING = "train_config.json"  # which LeRobot keeps beside a policy's weights
 
 
@@ -28,6 +29,14 @@ def policy_file(policy: str | Path, name: str) -> Path | None:
         return None
     except (OSError, ValueError) as error:  # huggingface_hub's errors derive from these
         raise PolicyError(f"No policy at {policy}: {str(error).splitlines()[0]}") from error
+
+
+def at_hand(policy: str | Path) -> bool:
+    """True if a policy can be read on this machine; that of a policy server elsewhere may not be."""
+    try:
+        return policy_file(policy, CONFIG) is not None
+    except PolicyError:
+        return False
 
 
 def dataset_info(root: str | Path) -> dict[str, Any]:

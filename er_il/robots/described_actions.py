@@ -1,13 +1,14 @@
 """What a dataset or a policy says of its actions: which arms they command, in which space, and how often."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from er_il.datasets.schema import dimension_names
-from er_il.envs.contract import Contract
-from er_il.envs.origin import INFO, dataset_info, training_info
+from er_il.envs.contract import Contract, policy_tags, read_policy_config
+from er_il.envs.origin import INFO, at_hand, dataset_info, training_info
 from er_il.policy.training import pretrained
 from er_il.spaces.layout import Layout
 from er_il.spaces.spec import ACTION, action_spec
@@ -20,18 +21,6 @@ class DescribedActions:
 
     layout: Layout
     rate: float  # [Hz]
-
-    def check_same(self, policy: str, trained_for: Layout) -> None:
-        """Refuse a policy that was trained for other actions.
-
-        Raises:
-            PolicyError: says what they are, and what these are.
-        """
-        if _meaning(self.layout) != _meaning(trained_for):
-            raise PolicyError(
-                f"The policy {policy} was trained for other actions ({_listed(trained_for)}) than the robot takes "
-                f"({_listed(self.layout)})."
-            )
 
 
 def described_actions(source: str) -> DescribedActions:
@@ -69,11 +58,38 @@ def _of_info(info: Mapping[str, Any], source: str) -> DescribedActions:
     return DescribedActions(layout, rate)
 
 
-def _meaning(layout: Layout) -> tuple[object, ...]:
-    """What two layouts share whose encoded vectors mean the same; units and order of the joints do not count."""
-    return (layout.encoded_names, *(Contract.of_space(part.space) for part in layout.parts))
+def check_policy(policy: str, layout: Layout) -> None:
+    """Refuse a policy that acts otherwise than a layout's encoded vectors, as far as its files tell.
+
+    Raises:
+        PolicyError: it was trained for other actions; says which.
+    """
+    if not at_hand(policy):
+        return
+    trained_for = _trained_for(policy)
+    if trained_for is not None:
+        got, needed = _meaning(trained_for), _meaning(layout)
+    elif (tagged := Contract.of_tags(policy_tags(policy))) and len(layout.parts) == 1:
+        got, needed = tagged.tag, Contract.of_space(layout.parts[0].space).tag
+    else:
+        got, needed = _width(policy), f"{len(layout.encoded_names)} dimensions"
+    if got != needed:
+        raise PolicyError(f"The policy {policy} was trained for other actions ({got}) than the robot takes ({needed}).")
 
 
-def _listed(layout: Layout) -> str:
-    spaces = ", ".join(Contract.of_space(part.space).tag for part in layout.parts)
-    return f"{spaces}: {', '.join(layout.encoded_names)}"
+def _trained_for(policy: str) -> Layout | None:
+    try:
+        return described_actions(policy).layout
+    except ErIlError:
+        return None  # its dataset is not at hand, or does not say it
+
+
+def _meaning(layout: Layout) -> str:
+    """What layouts share whose encoded vectors mean the same; units and order of the joints do not count."""
+    spaces = (Contract.of_space(part.space).tag for part in layout.parts)
+    return f"{' '.join(spaces)}: {', '.join(layout.encoded_names)}"
+
+
+def _width(policy: str) -> str:
+    outputs = read_policy_config(policy).get("output_features") or {}
+    return f"{math.prod(outputs.get(ACTION, {}).get('shape', ()))} dimensions"

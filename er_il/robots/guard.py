@@ -17,7 +17,7 @@ from safetensors import safe_open
 
 from er_il.datasets.schema import LEADER_JOINTS, SOURCE_ACTION
 from er_il.envs.contract import Contract, decodes, policy_tags
-from er_il.envs.origin import policy_file, training_info
+from er_il.envs.origin import at_hand, policy_file, training_info
 from er_il.envs.trust import POSTPROCESSOR, read_processor
 from er_il.robots.command_line import DECODING_ROBOT, RobotCommand
 from er_il.spaces.joint import JOINT
@@ -74,7 +74,7 @@ def _check_policy(command: RobotCommand) -> None:
 
 
 def _check_decoding(command: RobotCommand) -> None:
-    if command.policy and _at_hand(command.policy) and decodes(command.policy):
+    if command.policy and at_hand(command.policy) and decodes(command.policy):
         raise PolicyError(
             f"The policy {command.policy} decodes its actions by itself (er-il attach), and {DECODING_ROBOT} would do "
             "it again. Give it the inner robot (--robot.type=…), or take the policy that it was made from."
@@ -97,7 +97,7 @@ def action_space_of(policy: str) -> str | None:
     Raises:
         PolicyError: a file of the policy is damaged.
     """
-    if not _at_hand(policy):
+    if not at_hand(policy):
         logger.warning("er_il cannot check the actions of the policy %s: it is not at hand on this machine.", policy)
         return None
     with suppress(KeyError, TypeError, DatasetError):  # the dataset does not say what its actions mean
@@ -105,14 +105,6 @@ def action_space_of(policy: str) -> str | None:
             return str(action_spec(info["features"])["space"])
     tagged = Contract.of_tags(policy_tags(policy))
     return tagged.space if tagged else _by_statistics(policy)
-
-
-def _at_hand(policy: str) -> bool:
-    """True if a policy's files can be read here; those of an asynchronous policy server may not."""
-    try:
-        return policy_file(policy, "config.json") is not None
-    except PolicyError:
-        return False
 
 
 def _by_statistics(policy: str) -> str | None:

@@ -13,7 +13,7 @@ from er_il.control.commander import BEST_EFFORT, check_answer
 from er_il.datasets.schema import STATE
 from er_il.datasets.wiring import Wiring, read_wirings, wire
 from er_il.robots.command_line import DECODING_ROBOT, RobotCommand
-from er_il.robots.described_actions import DescribedActions, described_actions
+from er_il.robots.described_actions import DescribedActions, check_policy, described_actions
 from er_il.spaces.registry import ERJ
 from er_il.spaces.spec import ACTION
 from er_il.support.errors import ErIlError
@@ -90,7 +90,7 @@ class DecodingRobotConfig(RobotConfig):
         else:
             actions = described_actions(self.spec or policy)
         if policy:
-            _check_policy(policy, actions)
+            check_policy(policy, actions.layout)
         return DescribedActions(actions.layout, self.fps or actions.rate)
 
     def _declared(self, action_names: tuple[str, ...], state_names: tuple[str, ...]) -> DescribedActions:
@@ -102,16 +102,3 @@ class DecodingRobotConfig(RobotConfig):
             STATE: {"names": list(state_names), "shape": (len(state_names),)},
         }
         return DescribedActions(wire(wirings, features, self.action_space, self.rotation), self.fps)
-
-
-def _check_policy(policy: str, actions: DescribedActions) -> None:
-    """Refuse the command's policy if it acts otherwise; where its dataset is not at hand, nobody knows.
-
-    Raises:
-        PolicyError: it was trained for other actions.
-    """
-    try:
-        described = described_actions(policy)
-    except ErIlError:
-        return
-    actions.check_same(policy, described.layout)

@@ -1,7 +1,6 @@
 """A robot that takes encoded actions: ``--robot.type=er_il_arm``, any robot of LeRobot's with the decoder inside."""
 
 import time
-from collections.abc import Iterable, Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -13,15 +12,14 @@ from er_il.arms.arm import Vector
 from er_il.robots.command_line import DECODING_ROBOT
 from er_il.robots.hardware.decoding_config import DecodingRobotConfig
 from er_il.robots.hardware.episodes import EpisodeAnnouncements
+from er_il.robots.hardware.joint_vector import JointVector, bare
 from er_il.robots.hardware.joints import POSITION
 from er_il.robots.hardware.pace import Pace
-from er_il.robots.processors import measured_names
 from er_il.robots.robot_commander import RobotCommander
 from er_il.spaces.joint import JOINT
 from er_il.support.errors import ErIlError
 
 PASSED = (POSITION, ".vel")  # endings of the actions that lerobot-rollout sends to a robot
-BEYOND = 0.5  # [rad] outside of its limits, no arm measures a joint in the right units
 
 
 class DecodingRobot(Robot):
@@ -45,17 +43,13 @@ class DecodingRobot(Robot):
         super().__init__(config)
         self.config = config
         self._inner = make_robot_from_config(cast(RobotConfig, config.inner))
-        measured = _numbers(self._inner.observation_features)
-        actions = config.actions(_numbers(self._inner.action_features), measured)
+        takes, measures = _numbers(self._inner.action_features), _numbers(self._inner.observation_features)
+        actions = config.actions(takes, measures)
         self._layout = layout = actions.layout
         self._period = 1.0 / actions.rate
         self._commander = RobotCommander(layout, self._period, config.on_invalid)
         self._pace = Pace(actions.rate)
-        self._commanded = _found(layout.names, _numbers(self._inner.action_features), "takes")
-        where = measured_names(layout)
-        _found([where[joint] for part in layout.parts for joint in part.motors.joints], measured, "measures")
-        known = {_bare(name): name for name in measured}
-        self._observed = tuple(known.get(_bare(where[name]), "") for name in layout.names)  # "" where nothing measures
+        self._joints = JointVector(layout, takes, measures)
         self._announcements = EpisodeAnnouncements()
         self._episode = 0
         self._observation: RobotObservation | None = None  # the latest, until an action was decoded from it
@@ -99,8 +93,8 @@ class DecodingRobot(Robot):
         self._announcements.listen()
         self._episode = 0
         try:
-            self._check_posture()
-        except ErIlError:
+            self._joints.check(self._measured())
+        except Exception:
             self.disconnect()
             raise
 
@@ -122,22 +116,22 @@ class DecodingRobot(Robot):
         Raises:
             ErIlError: it lacks a dimension, or the measured joints are not finite.
         """
-        values = {_bare(name): float(value) for name, value in action.items()}
-        if self._layout.kind != JOINT and all(_bare(name) in values for name in self._layout.names):
-            names = (name for name in self._inner.action_features if _bare(name) in values)
-            return self._inner.send_action({name: values[_bare(name)] for name in names})
-        if missing := [name for name in self._layout.encoded_names if _bare(name) not in values]:
+        values = {bare(name): float(value) for name, value in action.items()}
+        if self._layout.kind != JOINT and all(bare(name) in values for name in self._layout.names):
+            names = (name for name in self._inner.action_features if bare(name) in values)
+            return self._inner.send_action({name: values[bare(name)] for name in names})
+        if missing := [name for name in self._layout.encoded_names if bare(name) not in values]:
             raise ErIlError(
                 f"The action lacks {', '.join(missing)}; it has {', '.join(action)}. {DECODING_ROBOT} takes "
-                f"{', '.join(self.action_features)}, or the joints {', '.join(self._commanded)}."
+                f"{', '.join(self.action_features)}, or the joints {', '.join(self._joints.names)}."
             )
         if self._announcements.episode != self._episode:
             self._episode = self._announcements.episode
             self._commander.reset()
         self._pace.tick()
-        encoded = np.array([values[_bare(name)] for name in self._layout.encoded_names])
+        encoded = np.array([values[bare(name)] for name in self._layout.encoded_names])
         command = self._commander.command(encoded, self._measured())
-        self._inner.send_action(dict(zip(self._commanded, command.vector.tolist(), strict=True)))
+        self._inner.send_action(self._joints.named(command.vector))
         return dict(zip(self.action_features, encoded.tolist(), strict=True))
 
     @check_if_not_connected
@@ -155,40 +149,9 @@ class DecodingRobot(Robot):
         observation, self._observation = self._observation, None
         if observation is None or time.monotonic() - self._observed_at > self._period:
             observation = self._inner.get_observation()
-        return np.array([float(observation[name]) if name else np.nan for name in self._observed])
-
-    def _check_posture(self) -> None:
-        measured = self._measured()
-        for part in self._layout.parts:
-            arm, q = part.space.arm, self._layout.angles(part, measured)
-            beyond = np.maximum(arm.lower - q, q - arm.upper) > BEYOND
-            if beyond.any():
-                values = measured[self._layout.indices(part)][beyond]
-                told = zip(np.array(part.motors.joints)[beyond], values, strict=True)
-                listed = ", ".join(f"{name} {value:.6g}" for name, value in told)
-                raise ErIlError(
-                    f"The robot measures {listed}, far outside of the limits of {arm.name}: check its units "
-                    f"({part.motors.units}), signs and offsets, and the arm."
-                )
+        return self._joints.measured(observation)
 
 
 def _numbers(features: dict[str, Any]) -> tuple[str, ...]:
     """Names of the features that are numbers, not images."""
-    return tuple(name for name, kind in features.items() if kind is float)
-
-
-def _bare(name: str) -> str:
-    """A name without the ending that some datasets leave out: ``gripper`` of ``gripper.pos``."""
-    return name.removesuffix(POSITION)
-
-
-def _found(names: Sequence[str], offered: Iterable[str], what: str) -> tuple[str, ...]:
-    """The names by which the inner robot knows these dimensions.
-
-    Raises:
-        ErIlError: it does not know one.
-    """
-    known = {_bare(name): name for name in offered}
-    if missing := [name for name in names if _bare(name) not in known]:
-        raise ErIlError(f"The inner robot {what} no {', '.join(missing)}; it {what} {', '.join(known.values())}.")
-    return tuple(known[_bare(name)] for name in names)
+    return tuple(name for name, kind in features.items() if not isinstance(kind, tuple))
