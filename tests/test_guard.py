@@ -99,6 +99,8 @@ def test_joint_policies_attached_ones_and_those_of_others_pass(tmp_path: Path):
     check(command(attached))
     with pytest.raises(PolicyError, match="would do it again"):
         check(command(attached, robot="er_il_arm"))
+    with pytest.raises(PolicyError, match=r"policy server, without plugins.*--robot.type=er_il_arm"):
+        check(RobotCommand(robot="so101_follower", policy=attached, served=True))
 
 
 def test_a_policy_elsewhere_passes_with_a_warning(caplog: pytest.LogCaptureFixture):
@@ -121,8 +123,9 @@ def test_joints_of_a_leader_are_not_recorded_as_encoded_actions():
 def test_commands_are_read_as_lerobot_reads_them(tmp_path: Path):
     arguments = ["--robot.type=er_il_sim", "--policy.path", "p", "--strategy.type=episodic", "--robot.seed=3"]
     assert RobotCommand.read(arguments) == RobotCommand(robot="er_il_sim", policy="p", strategy="episodic")
+    assert RobotCommand.read([*arguments, "--robot.type", "er_il_arm"]).robot == "er_il_arm"  # the last one counts
     client = RobotCommand.read(["--pretrained_name_or_path=p", "--robot.type=er_il_sim"])
-    assert client == RobotCommand(robot="er_il_sim", policy="p")
+    assert client == RobotCommand(robot="er_il_sim", policy="p", served=True)
     values = {"robot": {"type": "er_il_sim", "seed": 3}, "policy": {"path": "p"}, "fps": 20}
     for name, text in (("c.yaml", yaml.safe_dump(values)), ("c.json", json.dumps(values))):
         (tmp_path / name).write_text(text)

@@ -14,7 +14,7 @@ from lerobot.configs import parser
 
 DECODING_ROBOT = "er_il_arm"  # type of the robot that takes encoded actions
 
-POLICY = ("policy.path", "pretrained_name_or_path")  # of lerobot-rollout, and of the asynchronous robot client
+POLICY, SERVED = "policy.path", "pretrained_name_or_path"  # of lerobot-rollout, and of the asynchronous robot client
 
 
 @dataclass(frozen=True)
@@ -23,6 +23,7 @@ class RobotCommand:
 
     robot: str = ""  # type
     policy: str = ""  # folder, or Hub id
+    served: bool = False  # an asynchronous policy server loads the policy
     leader: str = ""  # type of the teleoperator
     dataset: str = ""  # that it records or replays
     strategy: str = ""  # of a rollout
@@ -30,23 +31,31 @@ class RobotCommand:
     @classmethod
     def read(cls, arguments: Sequence[str]) -> "RobotCommand":
         """Read a command's arguments, and the configuration file that they may name; arguments win."""
-        file = _configuration(parser.parse_arg("config_path", arguments))
+        file = _configuration(_last("config_path", arguments))
 
         def said(*options: str) -> str:
-            given = (parser.parse_arg(option, arguments) or _lookup(file, option) for option in options)
+            given = (_last(option, arguments) or _lookup(file, option) for option in options)
             return next((value for value in given if value), "")
 
         return cls(
             robot=said("robot.type"),
-            policy=said(*POLICY),
+            policy=said(POLICY, SERVED),
+            served=bool(said(SERVED)),
             leader=said("teleop.type"),
             dataset=said("dataset.repo_id"),
             strategy=said("strategy.type"),
         )
 
 
-def _configuration(path: str | None) -> Mapping[str, Any]:
-    if path is None or not Path(path).is_file():
+def _last(option: str, arguments: Sequence[str]) -> str:
+    """The last value of an option, which counts; "" if it is not given."""
+    pairs = (arguments[index : index + 2] for index in range(len(arguments)))
+    values = [value for value in (parser.parse_arg(option, pair) for pair in pairs) if value is not None]
+    return values[-1] if values else ""
+
+
+def _configuration(path: str) -> Mapping[str, Any]:
+    if not Path(path).is_file():
         return {}  # LeRobot says what is wrong with it
     try:
         values = yaml.safe_load(Path(path).read_text())  # JSON is YAML

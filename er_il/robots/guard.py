@@ -64,13 +64,24 @@ def check(command: RobotCommand) -> None:
 def _check_policy(command: RobotCommand) -> None:
     policy = command.policy
     space = action_space_of(policy)
-    if space in (None, JOINT) or decodes(policy):
+    if space in (None, JOINT):
         return
-    raise PolicyError(
-        f"The policy {policy} was trained in {space} action space; {command.robot} would take its numbers for joints. "
-        f"Let the robot decode them: --robot.type={DECODING_ROBOT} --robot.inner.type={command.robot}, and "
-        f"--robot.inner.… for its other options. Or let a copy of the policy: er-il attach {policy} --out OUT."
+    attached = decodes(policy)
+    robot = (
+        f"Let the robot decode: --robot.type={DECODING_ROBOT} --robot.inner.type={command.robot}, and --robot.inner.… "
+        "for its other options."
     )
+    if attached and command.served:
+        raise PolicyError(
+            f"The policy {policy} decodes its actions by itself (er-il attach), which LeRobot's policy server, without "
+            f"plugins, does not let it. Take the policy that it was made from. {robot}"
+        )
+    if not attached:
+        copy = "" if command.served else f" Or let a copy of the policy: er-il attach {policy} --out OUT."
+        raise PolicyError(
+            f"The policy {policy} was trained in {space} action space; {command.robot} would take its numbers for "
+            f"joints. {robot}{copy}"
+        )
 
 
 def _check_decoding(command: RobotCommand) -> None:
