@@ -78,6 +78,17 @@ def test_without_the_dataset_the_tag_tells(tmp_path: Path):
     check(command(policy(tmp_path / "joint", tag=tags["joint"])))
 
 
+def test_a_dataset_in_lerobots_cache_tells(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    path = policy(tmp_path / "p", space="erj")
+    (tmp_path / "me").mkdir()
+    (tmp_path / "data").rename(tmp_path / "me/data")
+    check(command(path))  # the folder that the training read has gone: nobody else's of that name counts
+    Path(path, "train_config.json").write_text(json.dumps({"dataset": {"repo_id": "me/data", "root": None}}))
+    monkeypatch.setattr("lerobot.utils.constants.HF_LEROBOT_HOME", tmp_path)
+    with pytest.raises(PolicyError, match="trained in erj"):
+        check(command(path))
+
+
 @pytest.mark.parametrize("kept", ["leader.joints", "source.action"])
 def test_without_both_the_statistics_tell_that_a_policy_saves(kept: str, tmp_path: Path):
     joints, pose = [10.0, -45.0, 3.0], [0.5, 0.1, 0.3]
