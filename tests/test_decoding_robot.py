@@ -160,6 +160,17 @@ def test_names_are_those_of_the_dataset_and_what_the_rollout_passes_on(tmp_path:
     assert not arm.is_connected
 
 
+def test_joint_actions_keep_the_arms_limits_too(monkeypatch: pytest.MonkeyPatch):
+    arm = robot(sim(seed=3), arm="panda", action_space="joint", fps=FPS)
+    sent = sent_to(arm._inner, monkeypatch)
+    arm.connect()
+    seen = arm.get_observation()
+    arm.send_action({name: seen[name] + 30.0 for name in JOINTS} | {"gripper.pos": 1.0})
+    steps = np.radians([sent[0][name] - seen[name] for name in JOINTS]) * FPS / PANDA.velocity
+    assert np.max(np.abs(steps)) == pytest.approx(1.0, abs=1e-3)  # of a period's way at full speed
+    arm.disconnect()
+
+
 @RobotConfig.register_subclass("test_two_arms")
 @dataclass(kw_only=True)
 class TwoArmsConfig(RobotConfig):
