@@ -31,7 +31,9 @@ SMALLER = {
     "lerobot-eval": "--eval.n_episodes=1 --eval.batch_size=1 --eval.recording=true",
     "lerobot-record": "--dataset.num_episodes=2 --dataset.episode_time_s=0.5 --robot.image_size=32",
     "lerobot-teleoperate": "--teleop_time_s=0.3 --robot.image_size=32",
+    "lerobot-replay --robot.type=er_il_arm": "--robot.inner.image_size=32",
     "lerobot-replay": "--robot.image_size=32",
+    "lerobot-rollout --robot.type=er_il_arm": "--duration=0.3 --robot.inner.image_size=32",
     "lerobot-rollout": "--duration=0.3 --robot.image_size=32",
     "lerobot-dataset-viz": "--save=1 --output-dir=.",
 }

@@ -177,7 +177,9 @@ def test_erj_takes_the_joint_that_it_commands() -> None:
 
 
 def test_what_is_wrong_is_told() -> None:
-    with pytest.raises(UnknownNameError, match=r"Unknown mode 'ik'\. Valid: joint, task, erj, era, erx, erj-free, erx-free\."):
+    with pytest.raises(
+        UnknownNameError, match=r"Unknown mode 'ik'\. Valid: joint, task, erj, era, erx, erj-free, erx-free\."
+    ):
         make_rl_env("reach_target", "ik")
     with pytest.raises(UnknownNameError, match="Unknown task 'fly'"):
         make_rl_env("fly")

@@ -103,6 +103,18 @@ def test_a_chunk_is_decoded_along_its_way_from_the_measured_joints(loaded: tuple
         np.testing.assert_allclose(decoded[0], [vector(q) for q in way], atol=0.06)
 
 
+def test_a_chunk_in_single_calls_is_decoded_as_in_one(loaded: tuple[Any, Any]):
+    """LeRobot's policy server observes once, then post-processes a chunk's actions one after the other."""
+    before, after = loaded
+    phase = np.linspace(0.0, 2.5, 50)[:, None]
+    way = PANDA.home + 0.5 * np.sin(phase * np.array([1.0, 0.7, -0.9, 0.8, 1.1, -0.6, 1.2]))  # up to 28 degrees away
+    for _ in range(2):  # the next chunk starts from its own observation, however far the one before it led
+        before({"observation.state": state(way[0])})
+        single = np.array([after(action[None])[0].numpy() for action in encoded(*way)])
+        np.testing.assert_allclose(single, [vector(q) for q in way], atol=0.1)
+        np.testing.assert_allclose(single, after(encoded(*way)[None])[0], atol=1e-4)
+
+
 def test_the_step_says_what_is_missing(loaded: tuple[Any, Any]):
     before, after = loaded
     with pytest.raises(ErIlError, match="knows no state"):

@@ -3,12 +3,15 @@
 import json
 import logging
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import draccus
 import gymnasium
 import numpy as np
 import pytest
 import torch
+from documented import documented
 from lerobot.datasets import LeRobotDataset
 from lerobot.policies.act.modeling_act import ACTPolicy
 from lerobot.robots import RobotConfig, make_robot_from_config
@@ -31,9 +34,12 @@ pytestmark = pytest.mark.usefixtures("quiet_logging")
 SEED = 7
 SIZE = 32
 ROBOT = ["--robot.type=er_il_sim", f"--robot.seed={SEED}", f"--robot.image_size={SIZE}"]
+# Its world's rate, not the one at which it is recorded, limits the joints' velocities.
+DECODING = ["--robot.type=er_il_arm", "--robot.fps=20", *(each.replace("robot.", "robot.inner.") for each in ROBOT)]
 LEADER = ["--teleop.type=er_il_scripted_leader", f"--teleop.seed={SEED}"]
 STEPS = 60  # of each recorded episode
 RATE = 60  # [Hz] the simulated world takes its own time, 20 Hz: here three times as fast as life
+CHUNK = 20  # actions at a time from the policy server, as documented
 NAMES = [*(f"panda_joint{i}.pos" for i in range(1, 8)), "gripper.pos"]
 TINY = ["dim_model=32", "dim_feedforward=32", "n_heads=2", "n_encoder_layers=1", "use_vae=false"]
 
@@ -51,6 +57,41 @@ def script(seed: int) -> np.ndarray:
     env.reset(seed=seed)
     world = env.unwrapped
     return np.array(list(world.leader(seed)))  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def sent_to_followers(monkeypatch: pytest.MonkeyPatch) -> list[np.ndarray]:
+    """What simulated followers are told from now on (8,) [deg]."""
+    sent, send = [], SimFollower.send_action
+
+    def kept(robot: SimFollower, action: dict[str, float]) -> dict[str, float]:
+        sent.append(np.array([action[name] for name in NAMES]))
+        return send(robot, action)
+
+    monkeypatch.setattr(SimFollower, "send_action", kept)
+    return sent
+
+
+def encoded_demonstration(policy: Path) -> tuple[np.ndarray, torch.Tensor]:
+    """The demonstration (T, 8) [deg], and as the policy's actions (T, 9)."""
+    spec = json.loads((policy.with_name("erj") / "meta/info.json").read_text())["features"][ACTION]["info"]["er_il"]
+    demonstration = in_degrees(script(SEED))
+    return demonstration, torch.from_numpy(Layout.from_spec(spec).encode(demonstration).astype(np.float32))
+
+
+def chunk_at(actions: torch.Tensor, step: int) -> torch.Tensor:
+    """The chunk of actions (1, CHUNK, 9) from a step on; the last one goes on."""
+    return torch.cat([actions[step:], actions[-1:].expand(CHUNK, -1)])[None, :CHUNK]
+
+
+def check_demonstrated(sent: np.ndarray, demonstration: np.ndarray) -> None:
+    """Check that nothing but a demonstration was commanded, and its first half.
+
+    By clocks and threads LeRobot may send an action twice or leave some out, after which the arm catches up: actions
+    are not compared by their number.
+    """
+    errors = np.abs(sent[:, None] - demonstration).max(axis=-1)  # [deg]
+    assert np.quantile(errors.min(axis=1), 0.9) < 0.1
+    assert np.quantile(errors.min(axis=0)[: len(demonstration) // 2], 0.9) < 0.1
 
 
 def in_degrees(script: np.ndarray) -> np.ndarray:
@@ -121,6 +162,109 @@ def test_an_erj_policy_drives_the_robot_to_the_cup_through_the_stock_rollout(
     run(lerobot_rollout.main, f"--policy.path={attached}", *ROBOT, "--fps=100",
         "--task=Reach the cup.", "--return_to_initial_position=false")  # fmt: skip
     assert "Simulated episode 0: success" in capfd.readouterr().err
+
+
+@pytest.mark.slow
+def test_the_same_policy_unattached_drives_the_robot_that_decodes(
+    policy: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+):
+    """The policy alone says what its actions mean; at the end LeRobot brings the arm back by its joints."""
+    demonstration, actions = encoded_demonstration(policy)
+    said = iter(actions)
+    say = interrupted_after(len(demonstration), lambda policy, batch: next(said)[None])
+    monkeypatch.setattr(ACTPolicy, "select_action", say)
+    sent = sent_to_followers(monkeypatch)
+    trained = policy / "checkpoints/last/pretrained_model"
+    run(lerobot_rollout.main, f"--policy.path={trained}", *DECODING, "--fps=100", "--task=Reach the cup.")  # fmt: skip
+    assert "Simulated episode 0: success" in capfd.readouterr().err
+    np.testing.assert_allclose(sent[: len(demonstration)], demonstration, atol=0.1)
+    np.testing.assert_allclose(sent[-1][:7], demonstration[0][:7], atol=1.0)  # back where it started
+
+
+@pytest.mark.slow
+def test_stock_replay_of_an_encoded_dataset_drives_the_arm_as_recorded(
+    policy: Path, recorded: Path, monkeypatch: pytest.MonkeyPatch
+):
+    encoded = policy.with_name("erj")
+    replayed = ["--dataset.repo_id=me/reach_erj", f"--dataset.root={encoded}", "--dataset.episode=1"]
+    sent = sent_to_followers(monkeypatch)
+    run(lerobot_replay.main, *DECODING, f"--robot.inner.seed={SEED + 1}", f"--robot.spec={encoded}", *replayed,
+        "--play_sounds=false")  # fmt: skip
+    columns = LeRobotDataset("me/reach", root=recorded, video_backend="pyav").hf_dataset.with_format("numpy")[:]
+    np.testing.assert_allclose(sent, columns[ACTION][columns["episode_index"] == 1], atol=0.1)  # [deg]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("decoder", ["robot", "policy"])
+def test_asynchronous_inference_drives_the_arm_as_demonstrated(
+    decoder: str, policy: Path, attached: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """LeRobot's policy server and robot client: the robot decodes, or a server that has imported the plugin."""
+    grpc = pytest.importorskip("grpc")
+    monkeypatch.chdir(tmp_path)  # the modules write logs when they are imported
+    from lerobot.async_inference import configs, policy_server, robot_client
+    from lerobot.transport import services_pb2_grpc
+
+    spec = json.loads((policy.with_name("erj") / "meta/info.json").read_text())["features"][ACTION]["info"]["er_il"]
+    demonstration = in_degrees(script(SEED))
+    actions = torch.from_numpy(Layout.from_spec(spec).encode(demonstration).astype(np.float32))
+    _, _, *served = documented("docs/robots.md", "python -m lerobot.async_inference.policy_server")
+    service = policy_server.PolicyServer(draccus.parse(configs.PolicyServerConfig, args=[*served, f"--fps={RATE}"]))
+
+    def predict(policy: ACTPolicy, batch: object) -> torch.Tensor:
+        assert service.last_processed_obs is not None
+        return chunk_at(actions, service.last_processed_obs.get_timestep())
+
+    monkeypatch.setattr(ACTPolicy, "predict_action_chunk", predict)
+    sent = sent_to_followers(monkeypatch)
+    send = interrupted_after(len(demonstration), robot_client.RobotClient.control_loop_action)
+    monkeypatch.setattr(robot_client.RobotClient, "control_loop_action", send)
+    server = grpc.server(ThreadPoolExecutor(4))
+    services_pb2_grpc.add_AsyncInferenceServicer_to_server(service, server)
+    port = server.add_insecure_port("127.0.0.1:0")
+    server.start()
+    path = policy / "checkpoints/last/pretrained_model" if decoder == "robot" else attached
+    _, _, *client = documented("docs/robots.md", "python -m lerobot.async_inference.robot_client")
+    if decoder == "policy":
+        client = [option for option in client if not option.startswith("--robot.")]
+    with pytest.raises(KeyboardInterrupt):
+        run(robot_client.async_client, *client, f"--server_address=127.0.0.1:{port}", f"--fps={RATE}",
+            f"--pretrained_name_or_path={path}", *(DECODING if decoder == "robot" else ROBOT))  # fmt: skip
+    server.stop(None)
+    check_demonstrated(np.array(sent), demonstration)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("decoder", ["robot", "policy"])
+def test_real_time_chunking_drives_the_arm_as_demonstrated(
+    decoder: str, policy: Path, attached: Path, monkeypatch: pytest.MonkeyPatch
+):
+    demonstration, actions = encoded_demonstration(policy)
+    sent = sent_to_followers(monkeypatch)
+
+    def predict(policy: ACTPolicy, batch: object, inference_delay: int, prev_chunk_left_over: object) -> torch.Tensor:
+        return chunk_at(actions, len(sent))
+
+    monkeypatch.setattr(ACTPolicy, "supports_rtc", lambda policy: True, raising=False)
+    monkeypatch.setattr(ACTPolicy, "predict_action_chunk", predict)
+    path = policy / "checkpoints/last/pretrained_model" if decoder == "robot" else attached
+    run(lerobot_rollout.main, f"--policy.path={path}", *(DECODING if decoder == "robot" else ROBOT), f"--fps={RATE}",
+        "--inference.type=rtc", "--inference.queue_threshold=10", "--duration=2", "--task=Reach the cup.",
+        "--return_to_initial_position=false")  # fmt: skip
+    check_demonstrated(np.array(sent), demonstration)
+
+
+@pytest.mark.slow
+def test_stock_rollout_refuses_the_policy_that_nothing_decodes(
+    policy: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    monkeypatch.delitem(sys.modules, "lerobot_env_er_il")  # imported anew, as in a process of its own
+    sent = sent_to_followers(monkeypatch)
+    with pytest.raises(SystemExit, match="2"):
+        run(lerobot_rollout.main, f"--policy.path={policy / 'checkpoints/last/pretrained_model'}", *ROBOT,
+            "--task=Reach the cup.")  # fmt: skip
+    assert "--robot.type=er_il_arm --robot.inner.type=er_il_sim" in capsys.readouterr().err
+    assert not sent
 
 
 @pytest.mark.slow

@@ -134,5 +134,5 @@ def _joints_named_as(arm: Arm, names: Sequence[str]) -> tuple[str, ...]:
             return joints
     raise DatasetError(
         f"Which dimensions are the joints of {arm.name} ({', '.join(arm.joints)})? Name them, in this order, "
-        f"with --joints. There are: {', '.join(names)}."
+        f"with --joints or in a file of arms. There are: {', '.join(names)}."
     )

@@ -18,6 +18,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, Field, StrictInt, StrictStr
 
 from er_il.envs.decoders import Decoder, decoder
+from er_il.envs.origin import CONFIG, policy_file, training_info
 from er_il.envs.trust import POSTPROCESSOR, check_steps, read_processor
 from er_il.kinematics.linear_coordinates import SPEC_KEY
 from er_il.kinematics.rotation import Quaternion
@@ -82,15 +83,6 @@ class Contract:
         return PREFIX + "/".join(getattr(self, part.name) for part in fields(self))
 
 
-def dataset_info(root: str | Path) -> dict[str, Any]:
-    """Read the ``meta/info.json`` of a LeRobot dataset.
-
-    Raises:
-        DatasetError: there is no dataset at ``root``.
-    """
-    return read_json(Path(root) / "meta" / "info.json", DatasetError)
-
-
 def policy_contract(policy: str | Path) -> Contract:
     """Find out what a policy's actions mean.
 
@@ -103,7 +95,7 @@ def policy_contract(policy: str | Path) -> Contract:
     Raises:
         PolicyError: the policy is missing or declares nothing.
     """
-    declared = _of_dataset(Path(policy)) or Contract.of_tags(_tags(policy))
+    declared = _of_dataset(policy) or Contract.of_tags(policy_tags(policy))
     if declared is None:
         raise PolicyError(
             f"The policy {policy} does not say which action space it was trained for. Train it with a tag such as "
@@ -162,43 +154,47 @@ class _PolicyConfig(BaseModel):
     tags: list[StrictStr] | None = None
 
 
-def read_policy_config(policy: Path) -> dict[str, Any]:
-    """Read the ``config.json`` of a policy in a folder.
+def read_policy_config(policy: str | Path) -> dict[str, Any]:
+    """Read the ``config.json`` of a policy, in a folder or on the Hub.
 
     Raises:
         PolicyError: it is missing or damaged.
     """
-    path = policy / "config.json"
+    path = policy_file(policy, CONFIG)
+    if path is None:
+        raise PolicyError(f"No policy at {policy}: it has no {CONFIG}.")
     config = read_json(path, PolicyError)
     check_values(_PolicyConfig, config, path, PolicyError)
     return config
 
 
 def decodes(policy: str | Path) -> bool:
-    """True if a policy in a folder decodes its actions by itself (see :mod:`er_il.robots.attachment`)."""
-    path = Path(policy) / POSTPROCESSOR
-    if not path.is_file():
+    """True if a policy decodes its actions by itself (see :mod:`er_il.robots.attachment`).
+
+    Args:
+        policy: Folder of a pretrained policy, or its Hub id.
+
+    Raises:
+        PolicyError: its post-processor is damaged, or the Hub has no such policy.
+    """
+    path = policy_file(policy, POSTPROCESSOR)
+    if path is None:
         return False  # LeRobot says what is missing
     return any(step.get("registry_name") == DECODE_POLICY_ACTION for step in read_processor(path)["steps"])
 
 
-def _of_dataset(policy: Path) -> Contract | None:
-    path = policy / "train_config.json"
-    if not path.is_file():
-        return None
+def _of_dataset(policy: str | Path) -> Contract | None:
     try:
-        root = read_json(path, PolicyError)["dataset"]["root"]
-        return Contract.of_spec(action_spec(dataset_info(root)["features"])) if root else None
-    except (OSError, KeyError, TypeError, AttributeError, DatasetError):
-        return None  # trained elsewhere, or the dataset has moved: the tag has to do
+        info = training_info(policy)
+        return Contract.of_spec(action_spec(info["features"])) if info else None
+    except (KeyError, TypeError, AttributeError, DatasetError):
+        return None  # damaged, or it does not say what its actions mean: the tag has to do
 
 
-def _tags(policy: str | Path) -> list[str] | None:
-    try:
-        if (config := Path(policy) / "config.json").is_file():
-            return read_policy_config(config.parent).get("tags")
-        from lerobot.configs import PreTrainedConfig  # seconds of imports that a folder does without
+def policy_tags(policy: str | Path) -> list[str] | None:
+    """Read the tags of a policy, in a folder or on the Hub.
 
-        return PreTrainedConfig.from_pretrained(policy).tags
-    except (OSError, ValueError) as error:  # huggingface_hub's errors derive from these
-        raise PolicyError(f"No policy at {policy}: {str(error).splitlines()[0]}") from error
+    Raises:
+        PolicyError: there is no such policy, or its configuration is damaged.
+    """
+    return read_policy_config(policy).get("tags")

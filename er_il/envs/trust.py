@@ -9,6 +9,7 @@ from typing import Any
 
 from pydantic import BaseModel, StrictStr
 
+from er_il.envs.origin import policy_file
 from er_il.support.declaration import check_values
 from er_il.support.errors import PolicyError
 from er_il.support.json_files import read_json
@@ -43,7 +44,7 @@ def check_steps(policy: str | Path) -> None:
         PolicyError: there is such a step, or a processor file cannot be read.
     """
     for name in PROCESSORS:
-        file = _file(policy, name)
+        file = policy_file(policy, name)
         if file is None:
             continue  # LeRobot loads none, or says what it misses
         for step in read_processor(file)["steps"]:
@@ -53,19 +54,3 @@ def check_steps(policy: str | Path) -> None:
                     f"{file} asks LeRobot to import and call {imported!r}, which may be any program. "
                     "If you trust where the policy comes from: --trust (lerobot-eval: --env.trust=true)."
                 )
-
-
-def _file(policy: str | Path, name: str) -> Path | None:
-    """A file of a policy; None if the policy has none of that name."""
-    if Path(policy).is_dir():
-        file = Path(policy) / name
-        return file if file.exists() else None
-    from huggingface_hub import hf_hub_download
-    from huggingface_hub.errors import EntryNotFoundError
-
-    try:
-        return Path(hf_hub_download(str(policy), name))  # the file that LeRobot will find in the cache
-    except EntryNotFoundError:
-        return None
-    except (OSError, ValueError) as error:  # huggingface_hub's errors derive from these
-        raise PolicyError(f"No policy at {policy}: {str(error).splitlines()[0]}") from error

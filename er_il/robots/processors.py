@@ -104,11 +104,18 @@ def _measured(observation: dict[str, Any], name: str) -> float:
 class DecodePolicyAction(_Decoding, AbsoluteActionsProcessorStep):
     """Decodes a policy's actions to a robot's joint vectors, in its units: a post-processor's last step.
 
+    A chunk of actions comes in one call, as real-time chunking has it, or in calls one after the other without a new
+    observation, as from LeRobot's policy server. Its first action is decoded from the measured joints, each later one
+    from where the one before it leads.
+
     Attributes:
         state_names: Names of ``observation.state``, as the policy was trained.
     """
 
     state_names: list[str]
+    _state: torch.Tensor | None = field(default=None, init=False, repr=False)  # that the last action was decoded from
+    _reached: Vector | None = field(default=None, init=False, repr=False)  # where it leads
+    _in_chunk: bool = field(default=False, init=False, repr=False)  # it was one of several from that state
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -142,21 +149,33 @@ class DecodePolicyAction(_Decoding, AbsoluteActionsProcessorStep):
         return {**transition, TransitionKey.ACTION.value: decoded}  # pyright: ignore[reportReturnType]
 
     def _decode(self, rows: Vector) -> list[Vector]:
-        measured = self._measured()
-        if len(rows) > 1:  # a chunk is planned from the state, although the one before it reached further
-            self._commander.anchor(measured)
+        state = self._latest_state()
+        if len(rows) == 1 and state is self._state and self._reached is not None:
+            measured, self._in_chunk = self._reached, True
+        else:
+            measured = self._measured(state)
+            if self._in_chunk or len(rows) > 1:  # planned from the state, although the chunk before reached further
+                self._commander.anchor(measured)
+            self._state, self._in_chunk = state, len(rows) > 1
         vectors = []
         for row in rows:
             vectors.append(self._commander.command(row, measured).vector)
-            measured = vectors[-1]  # a chunk's later actions start where the earlier ones lead
+            measured = self._reached = vectors[-1]
         return vectors
 
-    def _measured(self) -> Vector:
+    def reset(self) -> None:
+        super().reset()
+        self._state, self._reached, self._in_chunk = None, None, False
+
+    def _latest_state(self) -> torch.Tensor:
         state = None if self.relative_step is None else self.relative_step.get_cached_state()
         if state is None:
             raise ErIlError(
                 "The decoding step knows no state: the pre-processor that er-il attach wrote with it must run first."
             )
+        return state
+
+    def _measured(self, state: torch.Tensor) -> Vector:
         values = state.detach().cpu().numpy().astype(np.float64).reshape(-1)
         if len(values) != len(self.state_names):
             raise ShapeError("The state", values.shape, f"({len(self.state_names)},): {', '.join(self.state_names)}")

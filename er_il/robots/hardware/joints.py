@@ -42,7 +42,8 @@ class JointNames:
         if missing := [name for name in wanted if name not in values]:
             raise ErIlError(
                 f"The action lacks {', '.join(missing)}; it has {', '.join(named)}. The simulated robot takes "
-                f"{', '.join(self.names)}; an ERJ, ERA or task action must be decoded before (er-il attach)."
+                f"{', '.join(self.names)}; an ERJ, ERA or task action must be decoded before: by "
+                "--robot.type=er_il_arm around this robot, or er-il attach."
             )
         spoken = np.array([float(values[name]) for name in wanted])
         return np.append(self._motors.angles(spoken[:-1]), spoken[-1])
