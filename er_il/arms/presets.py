@@ -7,6 +7,7 @@ from math import pi
 from pathlib import Path
 
 from er_il.arms.gen3 import gen3_urdf
+from er_il.arms.openarm import SIDES, VERSIONS, hand_frame, openarm_home, openarm_joints, openarm_urdf
 from er_il.arms.panda8 import panda8_urdf
 from er_il.arms.urdf import example_robot_data
 
@@ -55,3 +56,17 @@ PRESETS = {
         home=(0.0, 0.26, pi, -2.27, 0.0, 0.96, pi / 2),
     ),
 }
+PRESETS |= {
+    f"openarm_{version}_{side}": Preset(
+        partial(openarm_urdf, version, side),
+        base_frame=own.base,
+        ee_frame=hand_frame(side),
+        joints=openarm_joints(side),
+        home=openarm_home(side),
+    )
+    for version, own in VERSIONS.items()
+    for side in SIDES
+}
+
+# Robots with several arms: label of each arm -> its preset, in the order of the robot's vectors.
+ROBOTS = {f"openarm_{version}": {side: f"openarm_{version}_{side}" for side in SIDES} for version in VERSIONS}
