@@ -10,7 +10,7 @@ from pathlib import Path
 
 from rich.progress import Progress
 
-from er_il.arms.arm import Arm
+from er_il.arms.robot import robot_arms
 from er_il.datasets.dataset import Dataset, datasets_in
 from er_il.datasets.demos import Demo, collect, demo_path, make_world
 from er_il.datasets.recipe import Recipe
@@ -51,9 +51,11 @@ def generate(recipe: Recipe, spaces: Sequence[str], out: Path, progress: Progres
         ErIlError: another process writes there.
     """
     asked, layouts = tuple(dict.fromkeys(spaces)), {}
+    arms = robot_arms(recipe.arm)
     for space in asked or ("",):
         check_space(space)
-        layouts[space] = Layout.of_space(make_arm_space(space, Arm.preset(recipe.arm)))  # raises if the arm has none
+        spaces_of_arms = {label: make_arm_space(space, arm) for label, arm in arms.items()}  # raises if an arm has none
+        layouts[space] = Layout.of_spaces(spaces_of_arms)
     with _writing_to(out), work_folder(out) as work:
         there = {path.name for path in datasets_in(out)} | {space for space in asked if (out / space).exists()}
         for space in sorted(there):

@@ -3,12 +3,15 @@
 Both decoders of task space read the same dataset and the same policy.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import accumulate, pairwise
 
 import numpy as np
 
 from er_il.arms.arm import Arm
 from er_il.spaces.base import ArmSpace
+from er_il.spaces.layout import Layout
 from er_il.spaces.pose import TASK
 from er_il.spaces.registry import AT, SPACES, make_arm_space, split_name
 from er_il.support.errors import ShapeError, UnknownNameError
@@ -27,7 +30,7 @@ class Decoder:
 
     space: str
     resolution: str = NEAREST
-    posture: tuple[float, ...] = ()  # (n,) [rad]; the arm's comfortable one if empty
+    posture: tuple[float, ...] = ()  # (n,) [rad], of several arms one after the other; comfortable ones if empty
 
     def __post_init__(self) -> None:
         split_name(self.space)  # raises if unknown
@@ -36,11 +39,22 @@ class Decoder:
 
     def space_of(self, arm: Arm, rotation: str = "quat") -> ArmSpace:
         """Build the action space that decodes for an arm."""
-        chosen = np.array(self.posture) if self.posture else arm.home
-        if chosen.shape != (arm.dof,):
-            raise ShapeError("The posture", chosen.shape, f"({arm.dof},)")
-        posture = chosen if self.resolution == POSTURE else None
-        return make_arm_space(self.space, arm, rotation=rotation, posture=posture)
+        return self.layout_of({"": arm}, rotation).parts[0].space
+
+    def layout_of(self, arms: Mapping[str, Arm], rotation: str = "quat") -> Layout:
+        """Build the layout of a robot's arms, by their labels, that decodes."""
+        homes = np.concatenate([arm.home for arm in arms.values()])
+        chosen = np.array(self.posture) if self.posture else homes
+        if chosen.shape != homes.shape:
+            raise ShapeError("The posture", chosen.shape, str(homes.shape))
+        ends = pairwise(accumulate((arm.dof for arm in arms.values()), initial=0))
+        postures = [chosen[start:end] if self.resolution == POSTURE else None for start, end in ends]
+        return Layout.of_spaces(
+            {
+                label: make_arm_space(self.space, arm, rotation=rotation, posture=posture)
+                for (label, arm), posture in zip(arms.items(), postures, strict=True)
+            }
+        )
 
 
 def _decoders() -> dict[str, Decoder]:

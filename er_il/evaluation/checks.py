@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from er_il.arms.arm import Arm
+from er_il.arms.robot import robot_arms
 from er_il.control.commander import check_answer
 from er_il.envs.contract import check_policy, policy_contract
 from er_il.envs.decoders import decoder
@@ -23,4 +23,4 @@ def check_evaluation(policy: Path, task: str, decoder_name: str, episodes: int, 
     task_id(task)
     check_answer(on_invalid)
     chosen, contract = decoder(decoder_name), policy_contract(policy)
-    check_policy(policy, chosen.space_of(Arm.preset(contract.arm), contract.rotation_code), trust)
+    check_policy(policy, chosen.layout_of(robot_arms(contract.arm), contract.rotation_code), trust)

@@ -20,8 +20,6 @@ from er_il.evaluation.posture_baselines import POSTURE_BASELINES, POSTURE_DECODE
 from er_il.experiments.schedule import Job
 from er_il.policy.configuration import default_config
 from er_il.policy.training import PRECISION, Training, train_episodes
-from er_il.spaces.registry import arm_space_from_spec
-from er_il.spaces.spec import action_spec
 from er_il.support.atomic_files import write_json
 from er_il.support.cost import Cost, measured
 from er_il.support.errors import ErIlError
@@ -148,13 +146,18 @@ class Film(Job):
 
 @lru_cache(maxsize=4)  # jobs of one policy follow one another
 def _demonstrated(training: Training) -> tuple[list[NDArray[np.float64]], ElbowReference | None]:
-    """The leader's paths (T, n + 1) [rad and opening] that a policy was trained on, and where the elbow was."""
-    info, episodes = Dataset(training.dataset).info, read_episodes(training.dataset)
-    arm = arm_space_from_spec(action_spec(info["features"])).arm
-    chosen = [episodes[i] for i in train_episodes(info)[: training.demonstrations]]
-    followed = [demo.state[:, : arm.dof].astype(np.float64) for demo in chosen]
+    """The leader's paths (T, n + 1) [rad and opening] that a policy was trained on, and where the elbow was.
+
+    The elbows of several arms are measured against nothing.
+    """
+    dataset, episodes = Dataset(training.dataset), read_episodes(training.dataset)
+    chosen = [episodes[i] for i in train_episodes(dataset.info)[: training.demonstrations]]
     leader = [demo.leader.astype(np.float64) for demo in chosen]
-    return leader, ElbowReference.of_demos(arm, 1 / info["fps"], followed)
+    arm, *others = [part.space.arm for part in dataset.layout.parts]
+    if others:
+        return leader, None
+    followed = [demo.state[:, : arm.dof].astype(np.float64) for demo in chosen]
+    return leader, ElbowReference.of_demos(arm, 1 / dataset.info["fps"], followed)
 
 
 def _notes(cost: Cost) -> dict[str, Any]:
