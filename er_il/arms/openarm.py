@@ -1,14 +1,15 @@
 """OpenArm, Enactic's open humanoid with two arms of seven joints, versions 1 and 2, by its published numbers.
 
-Positions, axes and ranges are those of the descriptions that Enactic publishes under Apache-2.0: ``openarm_description``
-1.0 and ``openarm_mujoco`` (v1), ``openarm-mujoco`` 2.3.0 (v2). Speeds are the caps of ``openarm-control`` 0.5.0; the
-descriptions have the motors' own (16.8, 5.4 and 20.9 rad/s), at which no person should stand beside an arm.
+Positions, axes and ranges are those of the descriptions that Enactic publishes under Apache-2.0:
+``openarm_description`` 1.0 and ``openarm_mujoco`` (v1), ``openarm-mujoco`` 2.3.0 (v2). Speeds are the caps of
+``openarm-control`` 0.5.0; the descriptions have the motors' own (16.8, 5.4 and 20.9 rad/s), which no arm should try.
 
 Both arms hang straight down at zero, where all frames are parallel to the base's: x forward, y left, z up. The axes of
-the shoulder, and those of the wrist, meet in a point. Link frames lie there, and not up to 38 mm along the same axes as in
-version 1's description: that moves no end effector, and the arm angle needs the points.
+the shoulder, and those of the wrist, meet in a point. Link frames lie there, and not up to 38 mm along the same axes
+as in version 1's description: that moves no end effector, and the arm angle needs the points.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import pi
 from pathlib import Path
@@ -33,7 +34,7 @@ RANGES = (
     (-1.570796, 1.570796),
 )
 SPEEDS = (2.0, 2.0, 3.14, 3.14, 6.3, 6.3, 6.3)
-MIRRORED = (1, 2)  # joints whose ranges the right arm has the other way round; those of the others are symmetric
+MIRROR = (-1, -1, -1, 1, -1, -1, -1)  # signs that make of one arm's posture the other arm's mirrored one
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ class Version:
     height: float  # [m] of the arms above it
     axes: tuple[Triple, ...]  # of the left arm's joints, in the base frame with the arm hanging
     turned: tuple[int, ...]  # joints whose axis points the other way on the right arm
-    tool: Triple  # [m] of the left hand's point between the fingertips, in the wrist's frame
+    tool: Triple  # [m] of the point between the fingertips, in the wrist's frame
 
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
@@ -102,9 +103,14 @@ def hand_frame(side: str) -> str:
 
 def openarm_home(side: str) -> tuple[float, ...]:
     """A comfortable posture (7,) [rad]."""
-    return tuple(-angle if side == "right" and i in MIRRORED else angle for i, angle in enumerate(HOME, start=1))
+    return HOME if side == "left" else mirrored(HOME)
+
+
+def mirrored(posture: Sequence[float]) -> tuple[float, ...]:
+    """The other arm's posture (7,) [rad] that is the mirror image of one arm's."""
+    return tuple(sign * angle for sign, angle in zip(MIRROR, posture, strict=True))
 
 
 def _range(joint: int, side: str) -> tuple[float, float]:
     lower, upper = RANGES[joint - 1]
-    return (-upper, -lower) if side == "right" and joint in MIRRORED else (lower, upper)
+    return (-upper, -lower) if side == "right" and MIRROR[joint - 1] < 0 else (lower, upper)

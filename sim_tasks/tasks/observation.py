@@ -22,7 +22,7 @@ class ArmObserver:
     """Measures one arm: its joints, its gripper's opening, and the pose of its end effector."""
 
     def __init__(self, label: str, arm: Arm, robot: RobotModel) -> None:
-        """Observe ``robot``, the ``arm`` compiled into a model; names are prefixed with its label, unless it has none."""
+        """Observe ``robot``, the ``arm`` compiled into a model; its names begin with the label, if any."""
         self._kinematics, self._robot = kinematics_of(arm), robot
         self._rotation = make_rotation(Quaternion.kind, self._kinematics.fk(arm.home)[:3, :3])
         self._quaternion = np.zeros(4)

@@ -36,7 +36,8 @@ class RobotTask(gym.Env[dict[str, Any], np.ndarray], ABC):
     Their subclasses build the world, place its objects, judge episodes and give rewards.
 
     Action, and ``agent_pos`` in the observation: as the robot's class says. ``environment_state``: position [m] and
-    quaternion (x, y, z, w) of each object; ``pixels``: a (size, size, 3) uint8 image a camera, if cameras are asked for.
+    quaternion (x, y, z, w) of each object; ``pixels``: a (size, size, 3) uint8 image a camera,
+    if cameras are asked for.
     Reward: the sum, in [0, 1], of the terms in ``info["reward_terms"]``; 1 if the goal holds.
     Every ``info`` has ``is_success`` and ``failure`` (empty while there is none) besides. Success and failure
     terminate an episode; at the step limit it is truncated, and ``failure`` names the reason. From then on the world

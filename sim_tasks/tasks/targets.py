@@ -13,7 +13,7 @@ OVERSHOOT = 2 * np.pi  # [rad] by which a target may lie beyond its limit, to be
 
 
 class JointTargets:
-    """Targets (n+1,) of an arm's joints [rad] and the gripper's opening in [0, 1]; of several arms, one after another."""
+    """Targets (n+1,) of an arm's joints [rad] and the gripper's opening in [0, 1]; of several arms, in turn."""
 
     def __init__(self, arms: Mapping[str, Arm]) -> None:
         """Targets of arms by their labels."""
