@@ -64,7 +64,7 @@ def _add_arm(spec: mujoco.MjSpec, label: str, arm: Arm) -> None:
     body, side = spec.worldbody, 1.0 if label == "left" else -1.0
     shapes = (*CAPSULES, None)
     joints = {element.get("name"): element for element in ET.fromstring(arm.model_xml).iter("joint")}
-    for name, torque, mass, shape in zip(arm.joints, TORQUES, MASSES, shapes, strict=True):
+    for i, (name, torque, mass, shape) in enumerate(zip(arm.joints, TORQUES, MASSES, shapes, strict=True)):
         element = joints[name]
         body = body.add_body(name=_text(element, "child", "link"), pos=_numbers(element, "origin", "xyz"), gravcomp=1)
         joint = body.add_joint(name=name, axis=_numbers(element, "axis", "xyz"))
@@ -74,7 +74,7 @@ def _add_arm(spec: mujoco.MjSpec, label: str, arm: Arm) -> None:
             centre, half = PALM
             body.add_geom(type=BOX, size=half, pos=centre, mass=mass, rgba=GREY)
         else:
-            (start, end, radius), look = shape, WHITE if len(body.name) % 2 else BLACK
+            (start, end, radius), look = shape, BLACK if i % 2 else WHITE
             ends = [coordinate for x, y, z in (start, end) for coordinate in (x, side * y, z)]
             body.add_geom(type=CAPSULE, fromto=ends, size=(radius, 0, 0), mass=mass, rgba=look)
         add_servo(spec, name)

@@ -37,11 +37,11 @@ class Press:
         console = spec.body("console")
         seen = {"mass": 0, "contype": 0, "conaffinity": 0, "group": 2}
         # The tool above the work, to look at.
-        ram = (self.face + 0.16, 0.0, self.top + 0.24)
-        console.add_geom(name="ram", type=BOX, size=(0.07, 0.22, 0.08), pos=ram, material="bench", **seen)
+        ram = (0.02, 0.0, self.top + 0.22)
+        console.add_geom(name="ram", type=BOX, size=(0.08, 0.30, 0.08), pos=ram, material="bench", **seen)
         for side, sign in SIDES.items():
-            post = (self.face + 0.16, sign * 0.30, self.top + 0.16)
-            console.add_geom(name=f"{side}_post", type=BOX, size=(0.04, 0.03, 0.16), pos=post, material="bench", **seen)
+            post = (0.06, sign * 0.26, self.top + 0.15)
+            console.add_geom(name=f"{side}_post", type=BOX, size=(0.04, 0.04, 0.15), pos=post, material="bench", **seen)
             _box(spec, f"{side}_guard", self.guards, (sign * (self.gap / 2 + 0.01), 0.02), self.guard_top, "yellow")
             middle = sign * (self.aisle + self.table_width) / 2
             _box(spec, f"{side}_table", self.tables, (middle, self.table_width), self.table_top, "wood", board=0.03)
