@@ -246,5 +246,6 @@ def _preset(name: str) -> Arm:
         base_frame=preset.base_frame,
         ee_frame=preset.ee_frame,
         joints=preset.joints,
+        redundant=preset.redundant,
         home=preset.home,
     )

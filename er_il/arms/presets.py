@@ -7,7 +7,7 @@ from math import pi
 from pathlib import Path
 
 from er_il.arms.gen3 import gen3_urdf
-from er_il.arms.openarm import SIDES, VERSIONS, hand_frame, openarm_home, openarm_joints, openarm_urdf
+from er_il.arms.openarm import SIDES, TWIST, VERSIONS, hand_frame, openarm_home, openarm_joints, openarm_urdf
 from er_il.arms.panda8 import panda8_urdf
 from er_il.arms.urdf import example_robot_data
 
@@ -21,6 +21,7 @@ class Preset:
     ee_frame: str
     joints: tuple[str, ...]
     home: tuple[float, ...]  # (n,) [rad] a comfortable posture
+    redundant: tuple[str, ...] | None = None  # joints that ERJ commands; the first n-6 if None
 
 
 PANDA_JOINTS = tuple(f"panda_joint{i}" for i in range(1, 8))
@@ -63,6 +64,7 @@ PRESETS |= {
         ee_frame=hand_frame(side),
         joints=openarm_joints(side),
         home=openarm_home(side),
+        redundant=(openarm_joints(side)[TWIST - 1],),
     )
     for version, own in VERSIONS.items()
     for side in SIDES

@@ -24,3 +24,8 @@ def robot_name(arms: Mapping[str, str]) -> str:
     """Name the robot that has the named arms under these labels: the arms' names, joined by +, if none is known."""
     known = (name for name, presets in ROBOTS.items() if presets == arms)
     return next(known, "+".join(arms.values()))
+
+
+def robot_with(arm: str) -> str:
+    """Name the robot that has an arm; the arm itself if it is no part of any."""
+    return next((name for name, presets in ROBOTS.items() if arm in presets.values()), arm)
