@@ -65,8 +65,8 @@ VERSIONS = {
     # the middle of their pads.
     "v2": Version("openarm_origin", 0.0, (*_ARM, _minus(Y), X), (1, 6), (0.0, 0.0, -0.1635)),
 }
-# The joint that ERJ commands: the upper arm's twist, which moves most in self-motion (`er-il advise openarm_v2_left`). The
-# first joint, which the paper commands on a Panda, is near a singularity where an elbow hangs.
+# The joint that ERJ commands: the upper arm's twist, which moves most in self-motion (`er-il advise openarm_v2_left`).
+# The first joint, which the paper commands on a Panda, is near a singularity where an elbow hangs.
 TWIST = 3
 HOME = (0.0, -0.15, 0.0, pi / 2, 0.0, 0.0, 0.0)  # [rad] the left forearm held out forward
 

@@ -18,7 +18,7 @@ class ArmOptions:
     """The arm, and the dimensions that are its joints."""
 
     arm: str = ""
-    """Preset (panda, panda8, xarm7, gen3), or path of a URDF."""
+    """Preset (panda, panda8, xarm7, gen3, openarm_v2_left, ...), or path of a URDF."""
     ee_frame: str = ""
     """Link whose pose the actions command; a URDF needs it."""
     base_frame: str = ""
@@ -37,7 +37,8 @@ class ArmOptions:
     urdf_joints: Names = ()
     """Joints of the URDF, base first; all between base and end effector if omitted."""
     arms: Path | None = None
-    """YAML file with one entry an arm, for several arms, in place of the options above."""
+    """YAML file with one entry an arm, for several arms, in place of the options above; or openarm_v1, openarm_v2:
+    two OpenArms as LeRobot's driver records them."""
 
     def wiring(self, redundant: tuple[str, ...] = (), angle_frames: tuple[str, ...] = ()) -> "Wiring":
         """The one arm that the options describe."""

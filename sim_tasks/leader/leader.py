@@ -56,7 +56,7 @@ class RobotLeader[Task: RobotTask](ABC):
     def demonstrate(self, seed: int) -> Iterator[np.ndarray]:
         """Plan a demonstration of the episode just reset, and play it.
 
-        Yields the leader's joint angles [rad] and gripper opening, (n+1,) float64 each control period, of each arm in turn.
+        Yields the leader's joint angles [rad] and gripper opening, (n+1,) float64 each control period; of each arm.
 
         Raises:
             PlanError: none of the random plans is feasible; known before the first yield.

@@ -109,5 +109,3 @@ class BimanualPress(BimanualTask):
                 gap = float(np.linalg.norm(tip - self.data.body(f"{side}_button").xpos))
                 approach += 0.5 * proximity(gap, APPROACH_WIDTH)
         return {"approach": approach, "press": press}
-
-

@@ -1,7 +1,7 @@
 """OpenArm in MuJoCo: two arms on a pedestal, with capsules and boxes as large as the links of version 2.
 
-Joints, ranges and torques are the robot's; the hand is simpler, its fingers slide as version 1's do. Masses are those of
-the published description (er_il.arms.openarm); the weight is held by the servos, as by a gravity compensation.
+Joints, ranges and torques are the robot's; the hand is simpler, its fingers slide as version 1's do. Torques and
+masses are those of the published description (er_il.arms.openarm); the weight is compensated.
 """
 
 import xml.etree.ElementTree as ET
@@ -43,10 +43,7 @@ def openarm_spec(arms: Mapping[str, Arm]) -> mujoco.MjSpec:
 
 def openarm_models(model: mujoco.MjModel, arms: Mapping[str, Arm]) -> list[RobotModel]:
     """Look the arms up in a compiled model."""
-    return [
-        RobotModel.of(model, arm, root(label), _fingers(label), _gripper(label))
-        for label, arm in arms.items()
-    ]
+    return [RobotModel.of(model, arm, root(label), _fingers(label), _gripper(label)) for label, arm in arms.items()]
 
 
 def root(label: str) -> str:

@@ -14,6 +14,7 @@ FORWARD = Rotation.from_euler("xy", [np.pi, -np.pi / 2]).as_matrix()  # of a han
 FINGERTIP = 0.0065  # [m] that the fingers reach beyond the end-effector frame
 DOWN = np.radians(184)  # arm angle of a left elbow that hangs
 BETWEEN = 0.415  # x [m] of the hands when the elbows are down, before the guards
+LOWER = 0.02  # [m] below the buttons, their height there
 BEFORE, DEPTH = 0.02, 0.033  # [m] before the buttons, and into them: a policy that stops a little short pressed, too
 HOLD = 0.5  # [s] for which it presses
 
@@ -24,7 +25,9 @@ class BimanualPressLeader(BimanualLeader[BimanualPress]):
     def _script(self, rng: np.random.Generator) -> tuple[Sequence[Segment], float]:
         world, checks = self._world, self._collisions()
         buttons = {side: world.object_pose(f"{side}_button")[:3] for side in SIDES}
-        vias = {side: np.array([BETWEEN, y, HEIGHT - 0.02]) + self._draw_via(rng) for side, (_, y, _) in buttons.items()}
+        vias = {
+            side: np.array([BETWEEN, y, HEIGHT - LOWER]) + self._draw_via(rng) for side, (_, y, _) in buttons.items()
+        }
         face = world.button.dome + FINGERTIP
         before, pressed = (
             {side: button - np.array([face + way, 0.0, 0.0]) for side, button in buttons.items()}
