@@ -44,7 +44,7 @@ class BimanualPress(BimanualTask):
         View("left_wrist", "openarm_left_link7", (0.06, 0.0, -0.03), (0.0, 0.0, -0.2), 70, up=(1.0, 0.0, 0.0)),
         View("right_wrist", "openarm_right_link7", (0.06, 0.0, -0.03), (0.0, 0.0, -0.2), 70, up=(1.0, 0.0, 0.0)),
         View("head", "world", (0.05, 0.0, 0.32), (0.45, 0.0, -0.1), 75),
-        View(SHOWCASE, "world", (-0.72, -0.98, 0.72), (0.27, 0.02, -0.06), 44),
+        View(SHOWCASE, "world", (-0.72, -0.98, 0.72), (0.24, 0.02, -0.03), 36),
     )
 
     def __init__(self, *, button_range: tuple[float, float] = (0.03, 0.04), **kwargs: Any) -> None:
