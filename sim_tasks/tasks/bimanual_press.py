@@ -33,7 +33,7 @@ class BimanualPress(BimanualTask):
     task = "bimanual_press"
     task_description = "Start the press: push both buttons at the same time."
     press = Press()
-    button = PushButton(radius=0.045, travel=0.045)
+    button = PushButton(radius=0.045)
     objects = ("left_button", "right_button")
     obstacles = press.parts
     centre = (0.50, 0.14)  # x, y [m] of the left button's mean place; the right one's is mirrored

@@ -15,7 +15,7 @@ FINGERTIP = 0.0065  # [m] that the fingers reach beyond the end-effector frame
 DOWN = np.radians(184)  # arm angle of a left elbow that hangs
 BETWEEN = 0.415  # x [m] of the hands when the elbows are down, before the guards
 LOWER = 0.02  # [m] below the buttons, their height there
-BEFORE, DEPTH = 0.02, 0.033  # [m] before the buttons, and into them: a policy that stops a little short pressed, too
+BEFORE, DEPTH = 0.02, 0.045  # [m] before the buttons, and into them: a policy that stops a little short pressed, too
 HOLD = 0.5  # [s] for which it presses
 
 
