@@ -50,7 +50,7 @@ def test_the_leader_presses_both_buttons_within_the_arms_speeds(world: BimanualP
     speeds = np.concatenate([arm.velocity for arm in ARMS.values()])
     for seed in range(3):
         _, info = world.reset(seed=seed, options={"beyond_success": True})
-        start, rewards = world.joint_positions, [sum(info["reward_terms"].values())]
+        start, rewards = world.joint_positions, [float(sum(info["reward_terms"].values()))]
         script = np.array(list(world.leader(seed)))
         joints = np.delete(script, GRIPPERS, axis=1)
         assert np.all(np.abs(np.diff(np.vstack([start, joints]), axis=0)) * world.rate <= speeds)
@@ -124,7 +124,9 @@ def test_a_batch_decodes_as_each_does_alone(demonstration: np.ndarray) -> None:
     for action in encoded(alone, demonstration)[:10]:
         alone.step(action)
         batch.step(np.stack([action, action]))
-    np.testing.assert_allclose(batch.envs[0].unwrapped.joint_positions, alone.world.joint_positions, atol=1e-6)
+    first = batch.envs[0]
+    assert isinstance(first, ActionSpaceEnv)
+    np.testing.assert_allclose(first.world.joint_positions, alone.world.joint_positions, atol=1e-6)
 
 
 def test_lerobots_environment_and_the_contract_know_both_arms() -> None:

@@ -90,7 +90,7 @@ def test_a_dataset_of_lerobots_driver_is_encoded_by_the_shipped_wiring(
     main()
     dataset = Dataset(out)
     assert [part.space.arm.name for part in dataset.layout.parts] == [f"openarm_{version}_{side}" for side in SIDES]
-    encoded, grippers = dataset.layout.split_encoded(dataset.vectors("action"))
+    encoded, grippers = dataset.layout.split_encoded(dataset.vectors("action").astype(np.float64))
     np.testing.assert_allclose(grippers[:, 0], values["left_gripper.pos"], atol=1e-4)
     for action, (side, path) in zip(encoded, paths.items(), strict=True):
         hand = kinematics_of(arms[side]).fk_batch(path)[:, :3, 3]

@@ -59,7 +59,7 @@ class Tally:
     def sum(cls, tallies: Sequence["Tally"]) -> "Tally":
         """The counts of several arms that were commanded together: a step takes as long as all of them."""
         statuses = sum((tally.statuses for tally in tallies), Counter[Status]())
-        latencies = [sum(each) for each in zip(*(tally.latencies for tally in tallies), strict=True)]
+        latencies = [sum(each, 0.0) for each in zip(*(tally.latencies for tally in tallies), strict=True)]
         return cls(statuses, latencies, max(tally.largest_step for tally in tallies))
 
     @property

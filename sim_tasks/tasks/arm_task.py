@@ -54,7 +54,7 @@ class ArmTask(RobotTask, ABC):
         self.observer = Observer({"": self.arm}, self.model, [self.robot], self.objects, self._cameras)
         self.targets = JointTargets({"": self.arm})
 
-    def _start(self, rng: np.random.Generator) -> Vector:
+    def _draw_start(self, rng: np.random.Generator) -> Vector:
         start = self.nominal_start
         start[-len(self.start) :] += rng.uniform(-self._start_range, self._start_range, len(self.start))
         return start

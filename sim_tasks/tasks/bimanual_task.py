@@ -63,7 +63,7 @@ class BimanualTask(RobotTask, ABC):
         """Joint angles (14,) [rad] around which episodes start."""
         return np.array([*self.start, *mirrored(self.start)])
 
-    def _start(self, rng: np.random.Generator) -> Vector:
+    def _draw_start(self, rng: np.random.Generator) -> Vector:
         start = self.nominal_start
         return start + rng.uniform(-self._start_range, self._start_range, len(start))
 

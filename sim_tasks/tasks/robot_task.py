@@ -130,7 +130,7 @@ class RobotTask(gym.Env[dict[str, Any], np.ndarray], ABC):
         """Find the robot in the compiled world; set ``observer``, ``targets`` and ``bodies``."""
 
     @abstractmethod
-    def _start(self, rng: np.random.Generator) -> Vector:
+    def _draw_start(self, rng: np.random.Generator) -> Vector:
         """Draw the joint angles [rad] at which an episode starts."""
 
     @abstractmethod
@@ -214,7 +214,7 @@ class RobotTask(gym.Env[dict[str, Any], np.ndarray], ABC):
         """
         chosen, self._beyond_success = read_options(options, self.objects, self.area)
         super().reset(seed=seed)
-        start = self._start(self.np_random)
+        start = self._draw_start(self.np_random)
         placement = self._draw(self.np_random) | chosen
         mujoco.mj_resetData(self.model, self.data)
         self._rest(start)
