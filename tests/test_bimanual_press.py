@@ -1,7 +1,11 @@
 """Bimanual Press: two arms through environments, decoders, recordings and contracts, and why both elbows matter."""
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
+from documented import documented, run, train_in_process
 from gymnasium.utils.env_checker import check_env
 from playing import play
 
@@ -12,8 +16,11 @@ from er_il.envs.decoders import DECODERS
 from er_il.envs.lerobot_plugin import ErIlEnvConfig
 from er_il.envs.side_by_side import BatchDecodingEnv
 from er_il.envs.wrapper import INVALID_ACTION, ActionSpaceEnv, make_action_space_env
+from er_il.evaluation.recording import record_rollout
+from er_il.policy.training import pretrained
 from er_il.spaces.layout import Layout
 from er_il.support.errors import UnknownNameError
+from er_il.viewer.show import save_rollout
 from sim_tasks.tasks.bimanual_press import PRESSED, BimanualPress
 from sim_tasks.world.press import SIDES
 
@@ -139,3 +146,21 @@ def test_lerobots_environment_and_the_contract_know_both_arms() -> None:
     assert Contract.of_tags([contract.tag]) == contract
     with pytest.raises(UnknownNameError, match=r"Unknown robot for bimanual_press 'panda'. Valid: openarm_v2."):
         ErIlEnvConfig(task=TASK)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("one_worker", "small_films")
+def test_the_pages_commands_make_a_policy_of_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    train_in_process(monkeypatch, "--batch_size=2", "--policy.dim_model=32", "--policy.dim_feedforward=32")
+    run("er-il", *documented("docs/arms.md", "er-il generate bimanual_press"), "--episodes=2")
+    run("er-il", *documented("docs/arms.md", "er-il train bimanual_press"), "--steps=2")
+    run("er-il", *documented("docs/arms.md", "er-il eval policies/bimanual_press"), "--episodes=1")
+    (cell,) = json.loads((tmp_path / f"outputs/eval/{TASK}/erj/report.json").read_text())["cells"]
+    assert cell["episodes"] == 1
+    run("er-il", "replay", f"datasets/{TASK}/erj")
+    (replayed,) = json.loads((tmp_path / "outputs/replay/report.json").read_text())["cells"]
+    assert replayed["successes"] == 2
+    trace, pictures = record_rollout(pretrained(Path(f"policies/{TASK}/erj")), TASK, "erj", 1000, film_every=40)
+    assert trace.q.shape[1] == 7 and trace.action.shape[1] == 9 and len(pictures) > 1
+    save_rollout(trace, tmp_path / "left.rrd")

@@ -131,6 +131,7 @@ def demo_grid(
         recipe = recipe.resized(demonstrations)
     return grid.replaced(
         title=f"{grid.title}: {task}",
+        arm=recipe.arm,
         tasks=(task,),
         decoders=decoders,
         training_seeds=(seed,),
