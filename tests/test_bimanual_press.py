@@ -155,7 +155,7 @@ def test_the_pages_commands_make_a_policy_of_it(tmp_path: Path, monkeypatch: pyt
     train_in_process(monkeypatch, "--batch_size=2", "--policy.dim_model=32", "--policy.dim_feedforward=32")
     run("er-il", *documented("docs/arms.md", "er-il generate bimanual_press"), "--episodes=2")
     run("er-il", *documented("docs/arms.md", "er-il train bimanual_press"), "--steps=2")
-    run("er-il", *documented("docs/arms.md", "er-il eval policies/bimanual_press"), "--episodes=1")
+    run("er-il", *documented("docs/arms.md", "er-il eval policies/bimanual_press/erj"), "--episodes=1")
     (cell,) = json.loads((tmp_path / f"outputs/eval/{TASK}/erj/report.json").read_text())["cells"]
     assert cell["episodes"] == 1
     run("er-il", "replay", f"datasets/{TASK}/erj")
