@@ -17,6 +17,7 @@ from er_il import Arm
 from er_il.arms.openarm import SIDES, VERSIONS, mirrored
 from er_il.arms.robot import robot_arms, robot_name
 from er_il.cli import main
+from er_il.cli.arm_options import ArmOptions
 from er_il.datasets.dataset import Dataset
 from er_il.datasets.wiring import read_wirings
 from er_il.kinematics.arm_angle import ArmAngle
@@ -109,5 +110,12 @@ def test_the_drivers_limits_lie_within_the_presets(side: str, limits: dict[str, 
 
 
 def test_a_file_of_arms_that_is_neither_there_nor_shipped() -> None:
-    with pytest.raises(DatasetError, match=r"There is no file of arms openarm_v3. Shipped: openarm_v1, openarm_v2."):
+    with pytest.raises(
+        DatasetError, match=r"^There is no file of arms openarm_v3\. Shipped: openarm_v1, openarm_v2\.$"
+    ):
         read_wirings(Path("openarm_v3"))
+
+
+def test_a_robot_of_two_arms_is_no_arm() -> None:
+    with pytest.raises(DatasetError, match=r"^openarm_v2 has several arms: give --arms openarm_v2\.$"):
+        ArmOptions(arm="openarm_v2").wirings()

@@ -53,6 +53,7 @@ class ArmOptions:
         Raises:
             ErIlError: both an arm and a file of arms are given, or they are wrong.
         """
+        from er_il.arms.presets import ROBOTS
         from er_il.datasets.wiring import read_wirings
         from er_il.support.errors import DatasetError
 
@@ -62,6 +63,8 @@ class ArmOptions:
             return read_wirings(self.arms)
         if not self.arm:
             return []
+        if self.arm in ROBOTS:
+            raise DatasetError(f"{self.arm} has several arms: give --arms {self.arm}.")
         wiring = self.wiring(redundant, angle_frames)
         wiring.build_arm()
         return [wiring]

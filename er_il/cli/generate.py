@@ -28,7 +28,7 @@ def generate(
             They name the datasets' folders.
         episodes: Number of demonstrations.
         seed: Seed of the demonstrations.
-        arm: Arm that does the task: panda, or panda8 with eight joints.
+        arm: Arm that does the task: panda, or panda8 with eight joints; openarm_v2 for a task with two arms.
         cameras: Cameras to record, separated by commas, such as wrist,shoulder.
         size: Width and height of the cameras' images [px].
         out: Folder of the datasets; datasets/<task> if omitted, and datasets/<task>_<arm> for another arm than the
