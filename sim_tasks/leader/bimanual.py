@@ -65,7 +65,7 @@ class LeaderArms:
 class BimanualLeader[Task: BimanualTask](RobotLeader[Task], ABC):
     """Demonstrates with two arms."""
 
-    clearance = 0.01  # [m] that plans keep from obstacles
+    clearance = 0.005  # [m] that plans keep from obstacles
 
     def _leading(self) -> LeaderArms:
         return LeaderArms(self._world.arms, 1 / self._world.rate)
