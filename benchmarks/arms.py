@@ -3,8 +3,7 @@
 All but the presets come as a URDF file and the names in it that a user would give; the rest is found.
 
 The numbers: KUKA LBR iiwa 14 R820 and Franka Research 3 as modified Denavit-Hartenberg parameters with the ranges and
-speeds of their data sheets; Rethink Sawyer and Enactic OpenArm 2.0 as the joint frames of their makers' descriptions
-(`sawyer_description`, `openarm_description`).
+speeds of their data sheets; Rethink Sawyer as the joint frames of its maker's description (`sawyer_description`).
 """
 
 from collections.abc import Callable
@@ -16,7 +15,6 @@ from er_il.arms.chain import ChainJoint, Tool, Triple, chain_urdf
 from er_il.arms.presets import PRESETS
 from er_il.arms.urdf import example_robot_data, generated_urdf
 
-X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 Range = tuple[float, float]
 
 
@@ -72,24 +70,6 @@ def sawyer() -> Arm:
     return _arm("sawyer", _joints(origins, ranges, speeds), Tool("hand", (0.0, 0.0, 0.0245), (0.0, 0.0, pi / 2)))
 
 
-def openarm() -> Arm:
-    """One arm of Enactic's OpenArm 2.0."""
-    rows: list[tuple[Triple, Triple, Triple, Range, float]] = [
-        ((0.0, -0.0625, 0.0), (0.0, 0.0, 0.0), Y, (-1.3963, 3.4907), 16.755),
-        ((0.0, -0.06, 0.0), (-0.5676, 0.0, 0.0), X, (-0.74213, 2.7485), 16.755),
-        ((0.0, 0.0, -0.06625), (0.0, 0.0, pi / 2), Z, (-0.01, 3.1415), 5.4454),
-        ((0.0, 0.0, -0.15375), (0.0, -1.6582, 0.0), Y, (-1.6582, 0.7853), 5.4454),
-        ((0.0, 0.0, -0.0955), (0.0, 0.0, -0.0644), Z, (-1.5447, 1.6), 20.944),
-        ((0.0, 0.0, -0.1205), (0.0, -0.4847, 0.0), Y, (-0.3, 1.27), 20.944),
-        ((0.0, 0.0, 0.0), (1.5677, 0.0, 0.0), X, (-0.03, 3.138), 20.944),
-    ]
-    joints = [
-        ChainJoint(f"joint{i}", f"link{i}", xyz, rpy, span, speed, axis)
-        for i, (xyz, rpy, axis, span, speed) in enumerate(rows, start=1)
-    ]
-    return _arm("openarm", joints, Tool("hand", (0.0, 0.0, -0.1)))
-
-
 def _example(name: str, file: str, base: str | None, tip: str) -> Arm:
     return Arm.from_urdf(example_robot_data(file), base_frame=base, ee_frame=tip, name=name)
 
@@ -100,7 +80,7 @@ def _named(name: str, file: str, tip: str, base: str | None = None) -> tuple[str
 
 REDUNDANT: dict[str, Callable[[], Arm]] = {
     **{name: partial(Arm.preset, name) for name in PRESETS},
-    **{arm.__name__: arm for arm in (iiwa14, fr3, sawyer, openarm)},
+    **{arm.__name__: arm for arm in (iiwa14, fr3, sawyer)},
     **dict(
         (
             _named("baxter", "baxter_description/urdf/baxter.urdf", "left_gripper", "left_arm_mount"),

@@ -49,5 +49,15 @@ def _rl_entry(task: str) -> TaskEntry:
 
 RL_TASKS = tuple(map(_rl_entry, (*FULL_BODY, *STANDARD)))
 
-for _entry in (*TASKS, *RL_TASKS):
+# For a robot with two arms.
+BIMANUAL_TASKS = (
+    TaskEntry(
+        "bimanual_press",
+        f"{_TASKS}.bimanual_press:BimanualPress",
+        120,
+        f"{_SCRIPTS}.bimanual_press:BimanualPressLeader",
+    ),
+)
+
+for _entry in (*TASKS, *RL_TASKS, *BIMANUAL_TASKS):
     register(_entry)

@@ -1,6 +1,5 @@
 """Datasets that er_il did not make, written with plain LeRobot calls."""
 
-import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -8,6 +7,7 @@ import numpy as np
 from lerobot.datasets import LeRobotDataset
 
 from er_il import Arm
+from er_il.arms.robot import robot_arms
 
 LENGTHS = (40, 30, 20)
 LEFT, RIGHT = Arm.preset("panda"), Arm.preset("xarm7")
@@ -94,26 +94,13 @@ def write_one_arm(root: Path, arm: Arm, names: Sequence[str], degrees: bool = Fa
 
 
 def write_openarm(folder: Path) -> None:
-    """Write what two OpenArms' owner has: ``openarm.urdf``, and demonstrations as LeRobot's driver names them.
-
-    The links have the official names; the kinematics are the Panda's, twice.
-    """
-    panda = ET.fromstring(LEFT.model_xml)
-    robot = ET.Element("robot", name="openarm")
-    ET.SubElement(robot, "link", name="openarm_body_link0")
+    """Write demonstrations with two OpenArms as LeRobot's driver names them, in ``demos/openarm``."""
     values: dict[str, list[np.ndarray]] = {}
-    for side, seed, y in (("left", 0, 0.2), ("right", 1, -0.2)):
-        text = ET.tostring(panda, encoding="unicode").replace("panda_", f"openarm_{side}_")
-        robot.extend(ET.fromstring(text))
-        mount = ET.SubElement(robot, "joint", name=f"openarm_{side}_mount", type="fixed")
-        ET.SubElement(mount, "parent", link="openarm_body_link0")
-        ET.SubElement(mount, "child", link=f"openarm_{side}_link0")
-        ET.SubElement(mount, "origin", xyz=f"0 {y} 0")
-        for path in paths(LEFT, seed):
+    for seed, (side, arm) in enumerate(robot_arms("openarm_v2").items()):
+        for path in paths(arm, seed):
             for i, joint in enumerate(np.rad2deg(path).T, start=1):
                 values.setdefault(f"{side}_joint_{i}.pos", []).append(joint)
             values.setdefault(f"{side}_gripper.pos", []).append(np.linspace(-60, 0, len(path)))
-    (folder / "openarm.urdf").write_text(ET.tostring(robot, encoding="unicode"))
     episodes = [{name: rows[episode] for name, rows in values.items()} for episode in range(len(LENGTHS))]
     write_dataset(folder / "demos" / "openarm", episodes, list(values), camera=True)
 

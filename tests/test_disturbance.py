@@ -8,7 +8,9 @@ PERIOD, DEVIATION, CLOSES = 0.05, 0.01, 4000  # [s], [rad], step
 
 def pushes(seed: int, gripper: np.ndarray) -> np.ndarray:
     script = np.column_stack([np.zeros((len(gripper), 7)), gripper])
-    return disturbances(script, DEVIATION, PERIOD, np.random.default_rng(seed))
+    drawn = disturbances(script, [7], DEVIATION, PERIOD, np.random.default_rng(seed))
+    assert not np.any(drawn[:, 7])  # the gripper is not pushed
+    return drawn[:, :7]
 
 
 def test_pushes_have_the_deviation_and_last_for_a_while():
@@ -34,4 +36,4 @@ def test_the_same_seed_pushes_the_same_and_no_deviation_does_not_push():
     assert np.array_equal(pushes(3, np.ones(50)), pushes(3, np.ones(50)))
     assert not np.array_equal(pushes(3, np.ones(50)), pushes(4, np.ones(50)))
     script = np.ones((50, 8))
-    assert not np.any(disturbances(script, 0.0, PERIOD, np.random.default_rng(0)))
+    assert not np.any(disturbances(script, [7], 0.0, PERIOD, np.random.default_rng(0)))

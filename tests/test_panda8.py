@@ -91,9 +91,9 @@ def test_a_rollout_takes_the_policys_arm(tmp_path: Path, decoder: str) -> None:
 def test_the_pages_commands_make_a_policy_of_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     train_in_process(monkeypatch, "--batch_size=2", "--policy.dim_model=32", "--policy.dim_feedforward=32")
-    run("er-il", *documented("docs/arms.md", "er-il generate"), "--episodes=2")
-    run("er-il", *documented("docs/arms.md", "er-il train"), "--steps=2")
-    run("er-il", *documented("docs/arms.md", "er-il eval"), "--episodes=1")
+    run("er-il", *documented("docs/arms.md", "er-il generate lift_cup"), "--episodes=2")
+    run("er-il", *documented("docs/arms.md", "er-il train lift_cup"), "--steps=2")
+    run("er-il", *documented("docs/arms.md", "er-il eval policies/lift_cup_panda8/erj"), "--episodes=1")
     assert {path.name for path in (tmp_path / "datasets/lift_cup_panda8").iterdir()} == {"joint", "task", "erj"}
     (cell,) = json.loads((tmp_path / "outputs/eval/lift_cup/erj/report.json").read_text())["cells"]
     assert cell["episodes"] == 1

@@ -8,7 +8,7 @@ import pytest
 
 from er_il.report.grid_page import write_pages
 from sim_tasks import TASKS
-from sim_tasks.tasks.arm_task import RATE
+from sim_tasks.tasks.robot_task import RATE
 
 ROOT = Path(__file__).resolve().parents[1]
 

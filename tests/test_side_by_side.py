@@ -58,7 +58,7 @@ def test_what_was_decoded_before_a_reset_is_forgotten() -> None:
     env = make_action_space_env("lift_cup", DECODERS["erj"])
     env.reset(seed=0)
     q = env.world.joint_positions
-    env.ahead = DecodedAhead(env.space.decode(env.space.encode(q + 0.01), seed=q), 0.0)
+    env.ahead = [DecodedAhead(env.space.decode(env.space.encode(q + 0.01), seed=q), 0.0)]
     env.reset(seed=0)
     *_, info = env.step(np.append(env.space.encode(q), 1.0).astype(np.float32))
     np.testing.assert_allclose(info["command"], q, atol=1e-5)

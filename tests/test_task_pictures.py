@@ -11,15 +11,16 @@ from documented import ROOT, documented
 from PIL import Image
 
 from er_il.datasets.recipe import Recipe
-from sim_tasks import RL_TASKS, TASKS, TaskEntry
-from sim_tasks.tasks.arm_task import RATE, ArmTask
+from sim_tasks import BIMANUAL_TASKS, RL_TASKS, TASKS, TaskEntry
+from sim_tasks.tasks.arm_task import ArmTask
 from sim_tasks.tasks.placement import Area
+from sim_tasks.tasks.robot_task import RATE, RobotTask
 
 BLOCK = 10  # [px] side of the blocks in which pictures are compared
 SAME = 14  # largest mean difference of a block between a picture and its compressed copy; an object moved by 2 cm: 20
 IMAGE = 128  # [px] side of a camera's image
 INTERVALS = ("speed_range", "closing_range", "other_range", "others_range", "mark_height_range")  # no sides
-ALL = (*TASKS, *RL_TASKS)
+ALL = (*TASKS, *RL_TASKS, *BIMANUAL_TASKS)
 FAR_AWAY = (-50.0, 0.0, 0.0)  # x, y [m], yaw, where no camera sees it
 
 
@@ -115,7 +116,7 @@ def test_the_page_says_how_long_and_how_much_varies(entry: TaskEntry):
 @pytest.mark.parametrize("entry", ALL)
 def test_the_page_lists_the_reward_terms_with_their_weights(entry: TaskEntry):
     world = gymnasium.make(entry.id).unwrapped
-    assert isinstance(world, ArmTask)
+    assert isinstance(world, RobotTask)
     sections = (ROOT / "docs" / "tasks.md").read_text().split("\n## ")
     (section,) = [each for each in sections if f"`{entry.task}`" in each.splitlines()[0]]
     (row,) = [line for line in section.splitlines() if line.startswith("| Reward terms |")]

@@ -45,8 +45,8 @@ def test_a_policy_that_names_a_class_to_import_is_not_loaded(
     # lerobot-eval makes the environments before it loads the policy.
     evaluating = ErIlEnvConfig(task="push_button_elbow", action_space="erj")
     with pytest.raises(PolicyError, match=r"--env.trust=true"):
-        check_policy(policy, evaluating.space, evaluating.trust)
-    check_policy(policy, evaluating.space, trust=True)
+        check_policy(policy, evaluating.layout, evaluating.trust)
+    check_policy(policy, evaluating.layout, trust=True)
     assert not (tmp_path / "executed").exists() and not (tmp_path / "out").exists()
 
 

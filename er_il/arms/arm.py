@@ -276,6 +276,7 @@ def _preset(name: str) -> Arm:
         base_frame=preset.base_frame,
         ee_frame=preset.ee_frame,
         joints=preset.joints,
+        redundant=preset.redundant,
         home=preset.home,
     )
     return arm.weighing(preset.weights)

@@ -7,6 +7,16 @@ from math import pi
 from pathlib import Path
 
 from er_il.arms.gen3 import gen3_urdf
+from er_il.arms.openarm import (
+    SIDES,
+    TWIST,
+    VERSIONS,
+    WEIGHTS,
+    hand_frame,
+    openarm_home,
+    openarm_joints,
+    openarm_urdf,
+)
 from er_il.arms.panda8 import panda8_urdf
 from er_il.arms.urdf import example_robot_data
 
@@ -21,6 +31,7 @@ class Preset:
     joints: tuple[str, ...]
     home: tuple[float, ...]  # (n,) [rad] a comfortable posture
     weights: tuple[tuple[float, ...], ...]  # (n-6, n) of ERX: those of er_il.spaces.margin.home_weights
+    redundant: tuple[str, ...] | None = None  # joints that ERJ commands; the first n-6 if None
 
 
 PANDA_JOINTS = tuple(f"panda_joint{i}" for i in range(1, 8))
@@ -63,3 +74,19 @@ PRESETS = {
         weights=((0.6961, 0.0155, -0.7061, 0.0177, -0.0303, 0.0071, 0.1237),),
     ),
 }
+PRESETS |= {
+    f"openarm_{version}_{side}": Preset(
+        partial(openarm_urdf, version, side),
+        base_frame=own.base,
+        ee_frame=hand_frame(side),
+        joints=openarm_joints(side),
+        home=openarm_home(side),
+        redundant=(openarm_joints(side)[TWIST - 1],),
+        weights=(WEIGHTS[version][side],),
+    )
+    for version, own in VERSIONS.items()
+    for side in SIDES
+}
+
+# Robots with several arms: label of each arm -> its preset, in the order of the robot's vectors.
+ROBOTS = {f"openarm_{version}": {side: f"openarm_{version}_{side}" for side in SIDES} for version in VERSIONS}

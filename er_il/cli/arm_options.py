@@ -18,7 +18,7 @@ class ArmOptions:
     """The arm, and the dimensions that are its joints."""
 
     arm: str = ""
-    """Preset (panda, panda8, xarm7, gen3), or path of a URDF."""
+    """Preset (panda, panda8, xarm7, gen3, openarm_v2_left, ...), or path of a URDF."""
     ee_frame: str = ""
     """Link whose pose the actions command; a URDF needs it."""
     base_frame: str = ""
@@ -37,7 +37,8 @@ class ArmOptions:
     urdf_joints: Names = ()
     """Joints of the URDF, base first; all between base and end effector if omitted."""
     arms: Path | None = None
-    """YAML file with one entry an arm, for several arms, in place of the options above."""
+    """YAML file with one entry an arm, for several arms, in place of the options above; or openarm_v1, openarm_v2:
+    two OpenArms as LeRobot's driver records them."""
 
     def wiring(self, redundant: tuple[str, ...] = (), angle_frames: tuple[str, ...] = ()) -> "Wiring":
         """The one arm that the options describe."""
@@ -52,6 +53,7 @@ class ArmOptions:
         Raises:
             ErIlError: both an arm and a file of arms are given, or they are wrong.
         """
+        from er_il.arms.presets import ROBOTS
         from er_il.datasets.wiring import read_wirings
         from er_il.support.errors import DatasetError
 
@@ -61,6 +63,8 @@ class ArmOptions:
             return read_wirings(self.arms)
         if not self.arm:
             return []
+        if self.arm in ROBOTS:
+            raise DatasetError(f"{self.arm} has several arms: give --arms {self.arm}.")
         wiring = self.wiring(redundant, angle_frames)
         wiring.build_arm()
         return [wiring]

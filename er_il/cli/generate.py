@@ -30,7 +30,7 @@ def generate(
             They name the datasets' folders.
         episodes: Number of demonstrations.
         seed: Seed of the demonstrations.
-        arm: Arm that does the task: panda, or panda8 with eight joints.
+        arm: Arm that does the task: panda, or panda8 with eight joints; openarm_v2 for a task with two arms.
         cameras: Cameras to record, separated by commas, such as wrist,shoulder.
         size: Width and height of the cameras' images [px].
         weights: File of the weights of erx, which er-il advise --fit erx writes; those of the arm if omitted.
@@ -39,7 +39,7 @@ def generate(
     """
     from rich.console import Console
 
-    from er_il.arms.arm import Arm
+    from er_il.arms.robot import robot_arms
     from er_il.cli.progress import make_progress
     from er_il.datasets.recipe import Recipe
     from er_il.datasets.weights import read_weights
@@ -52,7 +52,7 @@ def generate(
     recipe = recipe.replaced(**{key: value for key, value in given.items() if value is not None})
     asked = _split(spaces) or ()
     file = read_weights(weights, asked)
-    rows = file.of({"": Arm.preset(recipe.arm)})[""] if file else ()
+    rows = file.of(robot_arms(recipe.arm)) if file else {}
     from er_il.datasets.recording import generate as generate_datasets
     from er_il.support.counts import tally
 

@@ -2,6 +2,7 @@
 
 import time
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -53,6 +54,13 @@ class Tally:
     statuses: Counter[Status] = field(default_factory=Counter)
     latencies: list[float] = field(default_factory=list)  # [s] one a command
     largest_step: float = 0.0  # [rad]
+
+    @classmethod
+    def sum(cls, tallies: Sequence["Tally"]) -> "Tally":
+        """The counts of several arms that were commanded together: a step takes as long as all of them."""
+        statuses = sum((tally.statuses for tally in tallies), Counter[Status]())
+        latencies = [sum(each, 0.0) for each in zip(*(tally.latencies for tally in tallies), strict=True)]
+        return cls(statuses, latencies, max(tally.largest_step for tally in tallies))
 
     @property
     def invalid(self) -> int:

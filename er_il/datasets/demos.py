@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from er_il.datasets.disturbance import disturbances
 from er_il.datasets.recipe import Recipe
-from er_il.envs.protocol import BEYOND_SUCCESS, demonstrable_env
+from er_il.envs.protocol import BEYOND_SUCCESS, demonstrable_env, gripper_columns
 from er_il.envs.tasks import task_id
 from er_il.support.atomic_files import write_arrays
 from er_il.support.counts import tally
@@ -34,7 +34,7 @@ class Demo:
     """A successful demonstration of T control steps. Row t: what was seen, then what the leader did."""
 
     seed: int  # resets the environment to the same world, and the leader to the same plan
-    joints: Floats  # (T, n + 1) leader's joint positions [rad] and gripper opening, as sent to the follower
+    joints: Floats  # (T, n + 1) leader's joint positions [rad] and gripper opening, as sent; of each arm in turn
     state: Floats  # (T, s) the follower's ``agent_pos``
     environment_state: Floats  # (T, k) object poses
     images: Mapping[str, NDArray[np.uint8]] = field(default_factory=dict)  # camera -> (T, size, size, 3)
@@ -82,13 +82,13 @@ def record_demo(world: gymnasium.Env[Any, Any], seed: int, disturbance: float = 
     observation, info = world.reset(seed=seed, options={BEYOND_SUCCESS: True})
     rows: list[tuple[Any, Floats]] = []
     try:
-        script = np.array(list(demonstrable_env(world).leader(seed)))
+        inner = demonstrable_env(world)
+        script = np.array(list(inner.leader(seed)))
         rng = np.random.default_rng([seed, _PUSHES])
-        pushes = disturbances(script, disturbance, 1 / world.metadata["render_fps"], rng)
+        pushes = disturbances(script, gripper_columns(inner), disturbance, 1 / world.metadata["render_fps"], rng)
         for target, push in zip(script, pushes, strict=True):
             rows.append((observation, target.astype(np.float32)))
-            pushed = np.append(target[:-1] + push, target[-1]).astype(np.float32)
-            observation, _, terminated, truncated, info = world.step(pushed)
+            observation, _, terminated, truncated, info = world.step((target + push).astype(np.float32))
             if truncated or (terminated and not info["is_success"]):
                 break
     except PlanError:

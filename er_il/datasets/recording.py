@@ -7,10 +7,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
 from rich.progress import Progress
 
-from er_il.arms.arm import Arm, Weights
+from er_il.arms.arm import Weights
+from er_il.arms.robot import robot_arms
 from er_il.datasets.dataset import Dataset, datasets_in
 from er_il.datasets.demos import Demo, collect, demo_path, make_world
 from er_il.datasets.recipe import Recipe
@@ -34,7 +37,12 @@ class Generated:
 
 
 def generate(
-    recipe: Recipe, spaces: Sequence[str], out: Path, progress: Progress, workers: int, weights: Weights = ()
+    recipe: Recipe,
+    spaces: Sequence[str],
+    out: Path,
+    progress: Progress,
+    workers: int,
+    weights: Mapping[str, Weights] = MappingProxyType({}),
 ) -> Generated:
     """Record a recipe's demos and write one dataset a space into ``out``.
 
@@ -47,7 +55,7 @@ def generate(
         out: Folder of the datasets. Finished demos wait beside it, in ``<out>.partial``.
         progress: Where to show progress.
         workers: Number of worker processes.
-        weights: Of ERX (n-6, n); the arm's own if empty.
+        weights: Of ERX (n-6, n), by the arm's label; those of the arms where it says nothing.
 
     Raises:
         UnknownNameError: unknown task, space, arm or camera.
@@ -57,11 +65,11 @@ def generate(
         ErIlError: another process writes there.
     """
     asked, layouts = tuple(dict.fromkeys(spaces)), {}
-    arm = Arm.preset(recipe.arm)
-    arm = arm.weighing(weights) if weights else arm
+    arms = robot_arms(recipe.arm)
+    arms = {**arms, **{label: arms[label].weighing(rows) for label, rows in weights.items()}}
     for space in asked or ("",):
         check_space(space)
-        layouts[space] = Layout.of_space(make_arm_space(space, arm))  # raises if the arm has none
+        layouts[space] = Layout.of_spaces({label: make_arm_space(space, arm) for label, arm in arms.items()})
     with _writing_to(out), work_folder(out) as work:
         there = {path.name for path in datasets_in(out)} | {space for space in asked if (out / space).exists()}
         for space in sorted(there):
@@ -135,7 +143,7 @@ def _check_same(asked: Recipe, found: Recipe, where: Path) -> None:
 
 
 def _check_weights(asked: Layout, dataset: Path) -> None:
-    if asked.spec().get(SPEC_KEY) != Dataset(dataset).spec.get(SPEC_KEY):
+    if _weights(asked.spec()) != _weights(Dataset(dataset).spec):
         raise DatasetError(f"{dataset} has other weights of its linear coordinates; choose another --out.")
 
 
@@ -151,3 +159,8 @@ def _writing_to(out: Path) -> Iterator[None]:
         if full not in str(error):  # all that LeRobot's encoder threads pass on is the text
             raise
         raise DatasetError(f"Cannot write to {out}: {full}.") from error
+
+
+def _weights(spec: Mapping[str, Any]) -> list[Any]:
+    """What the specification of a layout says of ERX's weights, arm by arm."""
+    return [arm.get(SPEC_KEY) for arm in spec.get("arms", [spec])]

@@ -15,6 +15,7 @@ from er_il.spaces.registry import make_arm_space
 from er_il.spaces.spec import ACTION
 from er_il.support.declaration import Declaration, read_declaration
 from er_il.support.errors import ArmError, DatasetError, UnknownNameError
+from er_il.support.resources import data_dir
 
 Names = tuple[StrictStr, ...]
 Numbers = tuple[StrictInt | StrictFloat, ...]
@@ -108,9 +109,17 @@ def read_wirings(path: Path) -> list[Wiring]:
 
     A URDF's path counts from the file's folder.
 
+    Args:
+        path: The file, or the name of a shipped one, such as ``openarm_v2``.
+
     Raises:
         DatasetError: the file is unreadable, no such mapping, or an entry has a wrong key or value.
     """
+    shipped = {file.stem: file for file in sorted(data_dir("configs").glob("arms/*.yaml"))}
+    if not path.exists():
+        if str(path) not in shipped:
+            raise DatasetError(f"There is no file of arms {path}. Shipped: {', '.join(shipped)}.")
+        path = shipped[str(path)]
     return read_declaration(path, "file of arms", DatasetError, lambda entries: _wirings(entries, path.parent))
 
 

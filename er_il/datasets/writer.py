@@ -17,7 +17,7 @@ from er_il.datasets.normalisation import bound_rotation_deviation, normalise_obs
 from er_il.datasets.recipe import Recipe
 from er_il.datasets.record import DatasetRecord
 from er_il.datasets.schema import DEMO_SEED, ENVIRONMENT_STATE, IMAGES, LEADER_JOINTS, STATE, features
-from er_il.envs.protocol import arm_env
+from er_il.envs.protocol import robot_env
 from er_il.spaces.layout import Layout
 from er_il.spaces.spec import ACTION
 
@@ -34,7 +34,7 @@ class Writer:
         self._recipe, self._layout = recipe, layout
         os.environ.setdefault("SVT_LOG", "1")  # errors only: the encoders would bury the progress bar
         av.logging.set_libav_level(av.logging.ERROR)
-        inner = arm_env(world)
+        inner = robot_env(world)
         self._description: str = inner.task_description
         self._dataset = LeRobotDataset.create(
             repo_id=f"er_il/{recipe.task}",

@@ -7,22 +7,26 @@ that does not. A policy therefore declares its actions by a tag in its configura
     er_il:<space>/<arm>/<end-effector frame>/<rotation>/<redundant joints>
 
 for instance ``er_il:erj/panda/panda_hand_tcp/quat/panda_joint1``; a dash stands for a part that
-the space does not have, a plus sign joins several joints. ERX has its weights in their place.
+the space does not have, a plus sign joins several joints, and what several arms have each. ERX has its weights in
+the joints' place.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import BaseModel, Field, StrictInt, StrictStr
 
+from er_il.arms.presets import PRESETS
+from er_il.arms.robot import robot_name
 from er_il.envs.decoders import Decoder, decoder
 from er_il.envs.origin import CONFIG, policy_file, training_info
 from er_il.envs.trust import POSTPROCESSOR, check_steps, read_processor
 from er_il.kinematics.linear_coordinates import SPEC_KEY
 from er_il.kinematics.rotation import Quaternion
 from er_il.spaces.base import ArmSpace
+from er_il.spaces.layout import Layout
 from er_il.spaces.registry import AT, ERX, weights_text
 from er_il.spaces.spec import action_spec
 from er_il.support.declaration import check_values
@@ -31,6 +35,7 @@ from er_il.support.json_files import read_json
 
 PREFIX = "er_il:"
 NONE = "-"
+PLUS = "+"
 
 # Name of the post-processing step that `er-il attach` gives a policy, to decode for a robot by itself.
 DECODE_POLICY_ACTION = "er_il_decode_policy_action"
@@ -48,19 +53,29 @@ class Contract:
 
     @classmethod
     def of_spec(cls, spec: Mapping[str, Any]) -> "Contract":
-        """Return the contract of an action space's specification."""
+        """Return the contract of the specification of an action space, or of a layout."""
+        if "arms" in spec:
+            return cls._of_arms(spec["arms"])
         arm, rotation = spec["arm"], spec.get("rotation", NONE)
         if SPEC_KEY in spec:
             return cls(spec["space"], arm["name"], arm["ee_frame"], rotation, weights_text(spec[SPEC_KEY]["weights"]))
         # What a space commands beside the pose is the arm's redundant joints only if it names them.
         names = {name.rpartition(".")[0] for name in spec["names"]}  # joint.pos, or joint.delta
         commanded = [joint for joint in arm["redundant"] if joint in names]
-        redundant = "+".join(commanded) if "rotation" in spec and commanded else NONE
+        redundant = PLUS.join(commanded) if "rotation" in spec and commanded else NONE
         return cls(spec["space"], arm["name"], arm["ee_frame"], rotation, redundant)
 
     @classmethod
-    def of_space(cls, space: ArmSpace) -> "Contract":
-        """Return the contract that an action space fulfils."""
+    def _of_arms(cls, arms: Sequence[Mapping[str, Any]]) -> "Contract":
+        """The contract of several arms, which have an action space of one kind."""
+        each = [cls.of_spec(arm) for arm in arms]
+        name = robot_name({arm["label"]: one.arm for arm, one in zip(arms, each, strict=True)})
+        redundant = PLUS.join(one.redundant for one in each if one.redundant != NONE)
+        return cls(each[0].space, name, PLUS.join(one.frame for one in each), each[0].rotation, redundant or NONE)
+
+    @classmethod
+    def of_space(cls, space: ArmSpace | Layout) -> "Contract":
+        """Return the contract that an action space, or a layout of several arms, fulfils."""
         return cls.of_spec(space.spec())
 
     @classmethod
@@ -112,15 +127,17 @@ def decoder_for(name: str, contract: Contract) -> Decoder:
         UnknownNameError: no decoder has that name.
     """
     chosen = decoder(name)
-    return replace(chosen, space=ERX + AT + contract.redundant) if chosen.space == contract.space == ERX else chosen
+    alone = contract.arm in PRESETS  # several arms have the weights of their presets
+    weighed = alone and chosen.space == contract.space == ERX
+    return replace(chosen, space=ERX + AT + contract.redundant) if weighed else chosen
 
 
-def check_policy(policy: str | Path, space: ArmSpace, trust: bool = False) -> None:
+def check_policy(policy: str | Path, space: ArmSpace | Layout, trust: bool = False) -> None:
     """Refuse a policy whose actions are not those of ``space``, or that makes LeRobot execute what it names.
 
     Args:
         policy: Folder of a pretrained policy, or its Hub id.
-        space: The action space.
+        space: The action space, or the layout of several arms.
         trust: Accept processors with steps that are imported by their class: :mod:`er_il.envs.trust`.
 
     Raises:

@@ -3,17 +3,20 @@
 All decoders of task space read the same dataset and the same policy.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import accumulate, pairwise
 from typing import Any
 
 import gymnasium
 import numpy as np
 
 from er_il.arms.arm import Arm
-from er_il.envs.protocol import ClearanceEnv, arm_env, clearance_env
+from er_il.envs.protocol import ClearanceEnv, arms_of, clearance_env, robot_env
 from er_il.spaces.base import ArmSpace
 from er_il.spaces.clear import keeping_clear
 from er_il.spaces.delta import PREFIX
+from er_il.spaces.layout import Layout
 from er_il.spaces.pose import TASK
 from er_il.spaces.registry import AT, SPACES, make_arm_space, split_name
 from er_il.support.errors import ErIlError, ShapeError, UnknownNameError
@@ -33,7 +36,7 @@ class Decoder:
 
     space: str
     resolution: str = NEAREST
-    posture: tuple[float, ...] = ()  # (n,) [rad]; the arm's comfortable one if empty
+    posture: tuple[float, ...] = ()  # (n,) [rad], of several arms one after the other; comfortable ones if empty
 
     def __post_init__(self) -> None:
         split_name(self.space)  # raises if unknown
@@ -46,22 +49,35 @@ class Decoder:
         """False if an environment does not tell the clearances that ``clear`` needs."""
         return self.resolution != CLEAR or isinstance(env.unwrapped, ClearanceEnv)
 
-    def space_in(self, env: gymnasium.Env[Any, Any], rotation: str = "quat") -> ArmSpace:
-        """Build the action space that decodes in an environment.
+    def layout_in(self, env: gymnasium.Env[Any, Any], rotation: str = "quat") -> Layout:
+        """Build the layout of an environment's arms, each with the action space that decodes there.
 
         Raises:
-            ErIlError: it is no arm environment, or does not tell the clearances that ``clear`` needs.
+            ErIlError: it is no environment of arms, or does not tell the clearances that ``clear`` needs.
         """
-        space = self.space_of(arm_env(env).arm, rotation)
-        return keeping_clear(space, clearance_env(env).clearances) if self.resolution == CLEAR else space
+        if self.resolution != CLEAR:
+            return self.layout_of(arms_of(robot_env(env)), rotation)
+        world = clearance_env(env)
+        return Layout.of_space(keeping_clear(self.space_of(world.arm, rotation), world.clearances))
 
     def space_of(self, arm: Arm, rotation: str = "quat") -> ArmSpace:
         """Build the action space for an arm, as far as no world is needed: what actions mean, whatever decodes them."""
-        chosen = np.array(self.posture) if self.posture else arm.home
-        if chosen.shape != (arm.dof,):
-            raise ShapeError("The posture", chosen.shape, f"({arm.dof},)")
-        posture = chosen if self.resolution == POSTURE else None
-        return make_arm_space(self.space, arm, rotation=rotation, posture=posture)
+        return self.layout_of({"": arm}, rotation).parts[0].space
+
+    def layout_of(self, arms: Mapping[str, Arm], rotation: str = "quat") -> Layout:
+        """Build the layout of a robot's arms, by their labels, as far as no world is needed."""
+        homes = np.concatenate([arm.home for arm in arms.values()])
+        chosen = np.array(self.posture) if self.posture else homes
+        if chosen.shape != homes.shape:
+            raise ShapeError("The posture", chosen.shape, str(homes.shape))
+        ends = pairwise(accumulate((arm.dof for arm in arms.values()), initial=0))
+        postures = [chosen[start:end] if self.resolution == POSTURE else None for start, end in ends]
+        return Layout.of_spaces(
+            {
+                label: make_arm_space(self.space, arm, rotation=rotation, posture=posture)
+                for (label, arm), posture in zip(arms.items(), postures, strict=True)
+            }
+        )
 
 
 def _decoders() -> dict[str, Decoder]:

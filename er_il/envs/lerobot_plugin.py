@@ -13,14 +13,13 @@ from lerobot.envs import EnvConfig
 from lerobot.envs.utils import freeze_after_episode_end
 from lerobot.utils.constants import ACTION, OBS_ENV_STATE, OBS_IMAGES, OBS_STATE
 
-from er_il.arms.arm import Arm
+from er_il.arms.robot import robot_arms
 from er_il.control.commander import BEST_EFFORT, check_answer
 from er_il.envs.contract import check_policy
 from er_il.envs.decoders import CLEAR, NEAREST, Decoder
 from er_il.envs.side_by_side import BATCH_FROM, BatchDecodingEnv, ProcessesEnv, SideBySideEnv
 from er_il.envs.tasks import task_id
 from er_il.envs.wrapper import ActionSpaceEnv, make_action_space_env
-from er_il.spaces.base import ArmSpace
 from er_il.spaces.layout import Layout
 
 
@@ -35,7 +34,7 @@ class ErIlEnvConfig(EnvConfig):
         resolution: What IK does with the freedom that task space leaves: ``nearest``, ``posture`` or ``clear``.
         posture: Joint angles [rad] to which ``posture`` pulls; the arm's comfortable ones if empty.
         rotation: ``quat`` or ``rot6d``, as in the dataset that the policy was trained on.
-        arm: Name of the arm.
+        arm: Name of the arm, or of a robot of several, such as ``openarm_v2``.
         on_invalid: What the arm does with an invalid action: ``best_effort``, ``hold``, ``stop``.
         cameras: Cameras that the policy sees, none for a state-based policy.
         image_size: Width and height of their images [px].
@@ -63,7 +62,7 @@ class ErIlEnvConfig(EnvConfig):
         check_answer(self.on_invalid)
         probe = _probe(self.gym_id, self.arm, tuple(self.cameras), self.image_size)
         self.fps = probe.fps
-        action = PolicyFeature(FeatureType.ACTION, (len(Layout.of_space(self.space).encoded_names),))
+        action = PolicyFeature(FeatureType.ACTION, (len(self.layout.encoded_names),))
         self.features = {ACTION: action} | probe.features
         self.features_map = {ACTION: ACTION} | probe.names
 
@@ -92,9 +91,9 @@ class ErIlEnvConfig(EnvConfig):
         return partial(_make, self.gym_id, self.gym_kwargs, self.decoder, self.rotation, self.on_invalid)
 
     @property
-    def space(self) -> ArmSpace:
-        """The action space that a policy has to be trained for."""
-        return self.decoder.space_of(Arm.preset(self.arm), self.rotation)
+    def layout(self) -> Layout:
+        """The arms, each with the action space that a policy has to be trained for."""
+        return self.decoder.layout_of(robot_arms(self.arm), self.rotation)
 
     @property
     def decoder(self) -> Decoder:
@@ -105,7 +104,7 @@ class ErIlEnvConfig(EnvConfig):
         # LeRobot's own commands tell an environment nothing about the policy it will meet, but
         # the last chance to refuse a wrong one is here.
         if policy := parser.get_path_arg("policy"):
-            check_policy(policy, self.space, self.trust)
+            check_policy(policy, self.layout, self.trust)
         # An episode that has ended waits for the batch's slowest; without the freeze its successor's
         # first steps would count into its metrics.
         factories = [freeze_after_episode_end(self._maker)] * n_envs

@@ -1,6 +1,7 @@
 """The interface of a joint-level arm environment, by which er_il knows simulated tasks, its own and others'."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import accumulate, chain
 from typing import Any, Protocol, runtime_checkable
 
 import gymnasium
@@ -15,25 +16,19 @@ BEYOND_SUCCESS = "beyond_success"
 
 
 @runtime_checkable
-class ArmEnv(Protocol):
-    """A Gymnasium environment of one arm and its gripper, commanded in joint positions.
+class RobotEnv(Protocol):
+    """What environments of one arm and of several have in common.
 
-    Action: (n + 1,) joint position targets [rad] and the gripper's opening in [0, 1] (1 open). Observation: a dict
-    with ``agent_pos`` (joint positions, gripper opening, end-effector position and quaternion), ``environment_state``
-    (object poses) and, with cameras, ``pixels``. Every ``info`` holds ``is_success`` and ``failure`` ("" if none).
+    Observation: a dict with ``agent_pos`` (it begins with the joint positions, one arm after the other),
+    ``environment_state`` (object poses) and, with cameras, ``pixels``. Every ``info`` holds ``is_success`` and
+    ``failure`` ("" if none).
     """
 
-    arm: Arm
     task_description: str
 
     @property
     def joint_positions(self) -> Vector:
-        """The arm's true joint angles (n,) [rad]."""
-        ...
-
-    @property
-    def gripper_opening(self) -> float:
-        """The gripper's true opening in [0, 1]."""
+        """The true joint angles (n,) [rad], one arm after the other."""
         ...
 
     @property
@@ -56,15 +51,46 @@ class ArmEnv(Protocol):
 
 
 @runtime_checkable
-class DemonstrableEnv(ArmEnv, Protocol):
-    """An arm environment with a scripted leader.
+class ArmEnv(RobotEnv, Protocol):
+    """A Gymnasium environment of one arm and its gripper, commanded in joint positions.
+
+    Action: (n + 1,) joint position targets [rad] and the gripper's opening in [0, 1] (1 open). Behind the joint
+    positions, ``agent_pos`` holds the gripper's opening and the end effector's position and quaternion.
+    """
+
+    arm: Arm
+
+    @property
+    def gripper_opening(self) -> float:
+        """The gripper's true opening in [0, 1]."""
+        ...
+
+
+@runtime_checkable
+class ArmsEnv(RobotEnv, Protocol):
+    """A Gymnasium environment of several arms with a gripper each, commanded in joint positions.
+
+    Action: of each arm in turn, its joint position targets [rad] and its gripper's opening in [0, 1] (1 open).
+    """
+
+    arms: Mapping[str, Arm]  # by label
+
+    @property
+    def gripper_openings(self) -> Vector:
+        """The grippers' true openings in [0, 1], one an arm."""
+        ...
+
+
+@runtime_checkable
+class DemonstrableEnv(RobotEnv, Protocol):
+    """An environment with a scripted leader.
 
     A recording goes on to the leader's end: it resets with ``options={"beyond_success": True}``, after which success
     must neither stop the world nor the judgement of it.
     """
 
     def leader(self, seed: int) -> Iterator[NDArray[np.float64]]:
-        """The actions (n + 1,) of a demonstration of the episode just reset, one a control period.
+        """The actions of a demonstration of the episode just reset, one a control period.
 
         Raises:
             PlanError: no collision-free motion exists; known before the first action.
@@ -103,6 +129,33 @@ class ClearanceEnv(ArmEnv, Protocol):
         ...
 
 
+def arms_of(world: RobotEnv) -> Mapping[str, Arm]:
+    """The arms of an environment by their labels, in the order of its vectors; a single one has the label ""."""
+    return world.arms if isinstance(world, ArmsEnv) else {"": _one_arm(world).arm}
+
+
+def openings_of(world: RobotEnv) -> Callable[[], Vector]:
+    """Reads the true openings of an environment's grippers in [0, 1], one an arm."""
+    if isinstance(world, ArmsEnv):
+        return lambda: world.gripper_openings
+    one = _one_arm(world)
+    return lambda: np.array([one.gripper_opening])
+
+
+def gripper_columns(world: RobotEnv) -> list[int]:
+    """Where in an environment's actions the grippers are."""
+    return [end - 1 for end in accumulate(arm.dof + 1 for arm in arms_of(world).values())]
+
+
+def robot_env(env: gymnasium.Env[Any, Any]) -> RobotEnv:
+    """The environment of one arm or several under an environment's wrappers.
+
+    Raises:
+        ErIlError: it is none.
+    """
+    return env.unwrapped if isinstance(env.unwrapped, ArmsEnv) else arm_env(env)
+
+
 def arm_env(env: gymnasium.Env[Any, Any]) -> ArmEnv:
     """The arm environment under an environment's wrappers.
 
@@ -113,7 +166,7 @@ def arm_env(env: gymnasium.Env[Any, Any]) -> ArmEnv:
 
 
 def demonstrable_env(env: gymnasium.Env[Any, Any]) -> DemonstrableEnv:
-    """The arm environment under an environment's wrappers, with its leader.
+    """The environment under an environment's wrappers, with its leader.
 
     Raises:
         ErIlError: it is none, or has no leader.
@@ -139,11 +192,17 @@ def clearance_env(env: gymnasium.Env[Any, Any]) -> ClearanceEnv:
     return _inner(env, ClearanceEnv, "environment for task-clear, which needs the arm's true distances to the world")
 
 
-def _inner[T: ArmEnv](env: gymnasium.Env[Any, Any], protocol: type[T], what: str) -> T:
+def _one_arm(world: RobotEnv) -> ArmEnv:
+    assert isinstance(world, ArmEnv)
+    return world
+
+
+def _inner[T: RobotEnv](env: gymnasium.Env[Any, Any], protocol: type[T], what: str) -> T:
     inner = env.unwrapped
     if not isinstance(inner, protocol):
         name = env.spec.id if env.spec else type(inner).__name__
-        members = dict.fromkeys((*ArmEnv.__annotations__, *vars(ArmEnv), *vars(protocol)))
+        bases = protocol.__mro__[: protocol.__mro__.index(RobotEnv) + 1]
+        members = dict.fromkeys(chain(*(base.__annotations__ for base in bases), *map(vars, bases)))
         missing = [member for member in members if not member.startswith("_") and not hasattr(inner, member)]
         raise ErIlError(f"{name} is no {what}: it lacks {', '.join(missing)}.")
     return inner

@@ -49,10 +49,11 @@ class BatchDecodingEnv(SideBySideEnv):
         started = time.perf_counter()
         actions = _batch(self, actions)
         queries = [env.query(action) for env, action in zip(self._inner, actions, strict=True)]
-        batch = self._inner[0].space.decode_batch(*map(np.array, zip(*queries, strict=True)))
-        seconds = (time.perf_counter() - started) / self.num_envs
+        of_arms = zip(self._inner[0].layout.parts, zip(*queries, strict=True), strict=True)
+        batches = [part.space.decode_batch(*map(np.array, zip(*own, strict=True))) for part, own in of_arms]
+        seconds = (time.perf_counter() - started) / self.num_envs / len(batches)
         for row, env in enumerate(self._inner):
-            env.ahead = DecodedAhead(batch.result(row), seconds)
+            env.ahead = [DecodedAhead(batch.result(row), seconds) for batch in batches]
         return super().step(actions)
 
 

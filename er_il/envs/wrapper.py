@@ -1,17 +1,20 @@
 """A joint-level environment that takes encoded actions: decoding happens inside, at the true joint angles."""
 
-from typing import Any
+from collections.abc import Sequence
+from itertools import accumulate
+from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from er_il.arms.arm import Vector
-from er_il.control.commander import BEST_EFFORT, DecodedAhead, Tally
+from er_il.control.commander import BEST_EFFORT, Command, DecodedAhead, Tally
 from er_il.control.vector_commander import VectorCommander
 from er_il.envs.decoders import Decoder
-from er_il.envs.protocol import BEYOND_SUCCESS, arm_env
+from er_il.envs.protocol import BEYOND_SUCCESS, openings_of, robot_env
 from er_il.envs.tasks import task_id
+from er_il.kinematics.solver import Status
 from er_il.spaces.base import ArmSpace
 from er_il.spaces.layout import Layout
 from er_il.support.episode_end import Step, after_the_end
@@ -21,6 +24,14 @@ LEROBOT_OPTIONS = "lerobot_"  # with which the options begin that LeRobot gives 
 INVALID_ACTION = "invalid_action"  # the failure of an episode that an invalid action stopped
 
 
+class Query(NamedTuple):
+    """What an arm's action is decoded from."""
+
+    action: Vector  # (dim,)
+    measured: Vector  # (n,) [rad]
+    last: Vector  # (n,) [rad] the last command
+
+
 class ActionSpaceEnv(
     gymnasium.Wrapper[Any, NDArray[np.float32], Any, NDArray[np.float32]], gymnasium.utils.RecordConstructorArgs
 ):
@@ -28,7 +39,8 @@ class ActionSpaceEnv(
 
     The action's Box is that of the space: finite for deltas. ``info`` gains, at every step, ``command`` (n,) [rad]
     as sent to the arm, ``decode_status`` (a :class:`er_il.Status` value) and ``joint_step`` [rad], the largest joint
-    change asked for; ``tally`` sums the episode up.
+    change asked for; ``tally`` sums the episode up. Of several arms, ``command`` holds one after the other, and
+    ``decode_status`` is the first that is not ``ok``.
 
     Numbers that mean nothing (NaN, infinity) are a policy's answer: the step is taken with the status ``invalid``, and
     ``on_invalid`` says what the arm does. What is no vector of numbers of the space's shape is a mistake of the
@@ -36,30 +48,49 @@ class ActionSpaceEnv(
     last answer, without reward, until the next reset.
     """
 
-    def __init__(self, env: gymnasium.Env[Any, Any], space: ArmSpace, on_invalid: str = BEST_EFFORT) -> None:
-        """Wrap ``env``, whose actions are the arm's n joint targets [rad] and the gripper's opening."""
+    def __init__(self, env: gymnasium.Env[Any, Any], space: ArmSpace | Layout, on_invalid: str = BEST_EFFORT) -> None:
+        """Wrap ``env``, whose actions are the arm's n joint targets [rad] and the gripper's opening, or several arms'.
+
+        Args:
+            env: A joint-level environment (:mod:`er_il.envs.protocol`).
+            space: The arm's action space, or the layout of the environment's arms (:meth:`Layout.of_spaces`).
+            on_invalid: See :class:`er_il.control.commander.Commander`.
+        """
         gymnasium.utils.RecordConstructorArgs.__init__(self, space=space, on_invalid=on_invalid, _disable_deepcopy=True)
         gymnasium.Wrapper.__init__(self, env)
-        self.world = arm_env(env)
-        self.space = space
-        layout = Layout.of_space(space)
-        self._commander = VectorCommander(layout, 1.0 / env.metadata["render_fps"], on_invalid)
-        self.ahead: DecodedAhead | None = None  # the next step's action, if it is decoded already
+        self.world = robot_env(env)
+        self._openings = openings_of(self.world)
+        self.layout = space if isinstance(space, Layout) else Layout.of_space(space)
+        self._commander = VectorCommander(self.layout, 1.0 / env.metadata["render_fps"], on_invalid)
+        self._ends = list(accumulate(part.space.arm.dof for part in self.layout.parts))[:-1]
+        self.ahead: Sequence[DecodedAhead] | None = None  # each arm's part of the next action, if decoded already
         self._last: Step | None = None  # of an episode that has ended
         self._beyond_success = False
         self._started = False
-        low, high = (np.append(bound, opening) for bound, opening in zip(space.bounds, (0.0, 1.0), strict=True))
+        bounds = zip(*(part.space.bounds for part in self.layout.parts), strict=True)
+        grippers = np.zeros(len(self.layout.parts))
+        low, high = (self.layout.join_encoded(each, grippers + i) for i, each in enumerate(bounds))
         self.action_space = gymnasium.spaces.Box(low.astype(np.float32), high.astype(np.float32))
 
     @property
+    def space(self) -> ArmSpace:
+        """The action space of the only arm.
+
+        Raises:
+            ValueError: there are several.
+        """
+        (part,) = self.layout.parts
+        return part.space
+
+    @property
     def tally(self) -> Tally:
-        """Counts of the episode's decoded actions."""
-        return self._commander.arms[0].tally
+        """Counts of the episode's decoded actions; those of several arms summed up."""
+        return Tally.sum([arm.tally for arm in self._commander.arms])
 
     @property
     def last_command(self) -> Vector:
-        """The joint angles (n,) [rad] that were commanded last, which a delta counts from."""
-        return self._commander.arms[0].last
+        """The joint angles (n,) [rad] that were commanded last, which a delta counts from; one arm after the other."""
+        return np.concatenate([arm.last for arm in self._commander.arms])
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Start an episode; LeRobot's own options are for its wrappers and end here."""
@@ -70,16 +101,17 @@ class ActionSpaceEnv(
         self.ahead, self._last, self._started = None, None, True
         return observation, info
 
-    def query(self, action: ArrayLike) -> tuple[Vector, Vector, Vector]:
-        """The arm's part (dim,) of an action, the measured joints and the last command (n,) [rad] to decode it from.
+    def query(self, action: ArrayLike) -> list[Query]:
+        """Each arm's part of an action, and what it is decoded from.
 
         Raises:
             ValueError: as :meth:`step`.
         """
-        (own,), _ = self._commander.split_action(action)
+        actions, _ = self._commander.split_action(action)
         if not self._started:
             raise NotResetError
-        return own, self.world.joint_positions, self.last_command
+        lasts = (arm.last for arm in self._commander.arms)
+        return [Query(*each) for each in zip(actions, self._measured_arms(), lasts, strict=True)]
 
     def step(self, action: NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Decode an action, and take the step that it commands.
@@ -92,13 +124,12 @@ class ActionSpaceEnv(
             self.query(action)  # refuses what is no action, and a step before the first reset
             assert self._last is not None
             return after_the_end(self._last, self._last[0])
-        commanded = self._commander.command(action, self._measured(), ahead and (ahead,))
-        (arm,) = commanded.arms
-        vector = commanded.vector
-        vector[-1] = np.clip(vector[-1], 0.0, 1.0)  # the gripper's opening, which is passed through
+        commanded = self._commander.command(action, self._measured(), ahead)
+        vector, grippers = commanded.vector, self.layout.other_indices
+        vector[grippers] = np.clip(vector[grippers], 0.0, 1.0)  # the openings, which are passed through
         observation, reward, terminated, truncated, info = self.env.step(vector.astype(np.float32))
-        info = info | {"command": arm.q, "decode_status": str(arm.status), "joint_step": arm.joint_step}
-        if arm.stopped and not info["is_success"]:
+        info = info | _told(commanded.arms)
+        if any(arm.stopped for arm in commanded.arms) and not info["is_success"]:
             terminated = True
             info["failure"] = INVALID_ACTION
         step = observation, float(reward), terminated, truncated, info
@@ -107,7 +138,18 @@ class ActionSpaceEnv(
         return step
 
     def _measured(self) -> Vector:
-        return np.append(self.world.joint_positions, self.world.gripper_opening)
+        return self.layout.join(self._measured_arms(), self._openings())
+
+    def _measured_arms(self) -> list[Vector]:
+        """Each arm's true joint angles (n,) [rad]."""
+        return np.split(self.world.joint_positions, self._ends)
+
+
+def _told(arms: Sequence[Command]) -> dict[str, Any]:
+    """What ``info`` says of the commands of a step."""
+    status = next((arm.status for arm in arms if arm.status is not Status.OK), Status.OK)
+    joint_step = max(arm.joint_step for arm in arms)
+    return {"command": np.concatenate([arm.q for arm in arms]), "decode_status": str(status), "joint_step": joint_step}
 
 
 def make_action_space_env(
@@ -126,4 +168,4 @@ def make_action_space_env(
         ErIlError: it is no arm environment, or does not tell what the decoder needs.
     """
     env = gymnasium.make(task_id(task), **kwargs)
-    return ActionSpaceEnv(env, decoder.space_in(env, rotation), on_invalid)
+    return ActionSpaceEnv(env, decoder.layout_in(env, rotation), on_invalid)

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from er_il.arms.arm import Arm
+from er_il.arms.robot import robot_arms
 from er_il.control.commander import check_answer
 from er_il.envs.contract import check_policy, decoder_for, policy_contract
 from er_il.envs.decoders import decoder
@@ -25,4 +25,4 @@ def check_evaluation(policy: Path, task: str, decoder_name: str, episodes: int, 
     decoder(decoder_name)  # a mistake in the name is told first
     contract = policy_contract(policy)
     chosen = decoder_for(decoder_name, contract)
-    check_policy(policy, chosen.space_of(Arm.preset(contract.arm), contract.rotation_code), trust)
+    check_policy(policy, chosen.layout_of(robot_arms(contract.arm), contract.rotation_code), trust)

@@ -1,4 +1,7 @@
-"""One rollout of a trained policy, recorded in full: a trace, and a film if wanted."""
+"""One rollout of a trained policy, recorded in full: a trace, and a film if wanted.
+
+The trace of a robot with several arms is that of its first; the film shows all.
+"""
 
 from contextlib import closing
 from pathlib import Path
@@ -9,6 +12,7 @@ from lerobot.envs.utils import NEW_ROLLOUT_OPTION
 from numpy.typing import NDArray
 
 from er_il.envs.contract import check_policy
+from er_il.envs.protocol import openings_of
 from er_il.evaluation.rollout import TIMEOUT
 from er_il.evaluation.trace import Trace
 from er_il.policy.actor import Actor, environment_of, one_thread
@@ -36,22 +40,25 @@ def record_rollout(
     rows: dict[str, list[Any]] = {key: [] for key in ("q", "gripper", "action", "command", "status", "state")}
     pictures: list[Picture] = []
     with closing(config.make()) as env, one_thread():
-        check_policy(policy, env.space)
+        check_policy(policy, env.layout)
         actor = Actor.load(policy, config)
-        world = env.world
+        world, layout = env.world, env.layout
+        part = layout.parts[0]
+        openings = openings_of(world)
         observation, info = env.reset(seed=seed, options={NEW_ROLLOUT_OPTION: True})
         actor.reset(seed)
         done = False
         while not done:
             if film_every and len(rows["q"]) % film_every == 0:
                 pictures.append(world.render())
-            rows["q"].append(world.joint_positions)
-            rows["gripper"].append(world.gripper_opening)
+            rows["q"].append(world.joint_positions[: part.space.arm.dof])
+            rows["gripper"].append(openings()[0])
             rows["state"].append(observation["environment_state"])
             action = actor.act(_batched(observation), world.task_description)[0]
             observation, _, terminated, truncated, info = env.step(action)
-            rows["action"].append(action)
-            rows["command"].append(info["command"])
+            actions, grippers = layout.split_encoded(action)
+            rows["action"].append(np.append(actions[0], grippers[0]))
+            rows["command"].append(info["command"][: part.space.arm.dof])
             rows["status"].append(info["decode_status"])
             done = terminated or truncated
         if film_every:
@@ -62,7 +69,7 @@ def record_rollout(
             period=1 / env.metadata["render_fps"],
             label=decoder_name,
             outcome=SUCCESS if info["is_success"] else info["failure"] or TIMEOUT,
-            spec=ActionSpace(env.space).spec(),
+            spec=ActionSpace(part.space).spec(),
             q=np.array(rows["q"]),
             gripper=np.array(rows["gripper"]),
             action=np.array(rows["action"], dtype=np.float64),

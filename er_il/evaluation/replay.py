@@ -15,7 +15,7 @@ import gymnasium
 import numpy as np
 import pandas as pd
 
-from er_il.arms.arm import Arm
+from er_il.arms.robot import robot_arms
 from er_il.datasets.dataset import Dataset
 from er_il.datasets.recipe import Recipe
 from er_il.datasets.record import DatasetRecord, RecordedEpisode, read_episodes
@@ -24,7 +24,7 @@ from er_il.envs.tasks import task_id
 from er_il.envs.wrapper import ActionSpaceEnv, make_action_space_env
 from er_il.evaluation.results import summarise
 from er_il.kinematics.rotation import Quaternion
-from er_il.spaces.registry import arm_space_from_spec, name_of
+from er_il.spaces.registry import name_of
 from er_il.support.atomic_files import write_json
 from er_il.support.workers import StatefulWorkers
 
@@ -121,7 +121,7 @@ def replay_demo(world: ActionSpaceEnv, demo: RecordedEpisode) -> Replayed:
     world.reset(seed=demo.seed)
     grace = round(GRACE * world.metadata["render_fps"])
     actions = np.concatenate([demo.actions, np.repeat(demo.actions[-1:], grace, axis=0)])
-    joints = demo.state[:, : world.space.arm.dof]
+    joints = demo.state[:, : len(world.last_command)]
     deviation = joint_step = 0.0
     statuses: Counter[str] = Counter()
     info: dict[str, Any] = {}
@@ -163,10 +163,10 @@ class _Play:
 
 
 def _plays(dataset: Path) -> list[_Play]:
-    spec, recipe = Dataset(dataset).spec, DatasetRecord.read(dataset).recipe
-    space = arm_space_from_spec(spec)  # refuses what this version would decode differently
-    name = name_of(space, Arm.preset(recipe.arm))
-    rotation = spec.get("rotation", Quaternion.kind)
+    recipe = DatasetRecord.read(dataset).recipe
+    first = Dataset(dataset).layout.parts[0]  # refuses what this version would decode differently
+    name = name_of(first.space, robot_arms(recipe.arm)[first.label])
+    rotation = first.space.spec().get("rotation", Quaternion.kind)
     with closing(gymnasium.make(task_id(recipe.task), **recipe.replaced(cameras=()).environment)) as env:
         readers = [key for key, each in DECODERS.items() if each.space == name and each.works_in(env)] or [name]
     return [_Play(recipe, reader, rotation) for reader in readers]

@@ -6,7 +6,7 @@ from typing import Annotated, Self
 
 from pydantic import AliasChoices, Field, StrictInt, StrictStr, model_validator
 
-from er_il.arms.arm import Arm
+from er_il.arms.robot import robot_arms
 from er_il.datasets.recipe import Recipe
 from er_il.evaluation.posture_baselines import POSTURE_BASELINES, space_of
 from er_il.support.declaration import Declaration
@@ -61,7 +61,7 @@ class Grid(Declaration):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        Arm.preset(self.arm)  # raises if unknown
+        robot_arms(self.arm)  # raises if unknown
         for name in self.posture_baselines:
             if name not in POSTURE_BASELINES:
                 raise UnknownNameError("posture baseline", name, POSTURE_BASELINES)
@@ -131,6 +131,7 @@ def demo_grid(
         recipe = recipe.resized(demonstrations)
     return grid.replaced(
         title=f"{grid.title}: {task}",
+        arm=recipe.arm,
         tasks=(task,),
         decoders=decoders,
         training_seeds=(seed,),

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.progress import Progress
 
-from er_il.arms.arm import Arm
 from er_il.datasets.dataset import Dataset
 from er_il.datasets.recipe import Recipe
 from er_il.datasets.record import read_episodes
@@ -19,11 +18,10 @@ from er_il.datasets.recording import generate
 from er_il.evaluation.elbow import ElbowReference
 from er_il.evaluation.posture_baselines import POSTURE_BASELINES, POSTURE_DECODER
 from er_il.experiments.schedule import Job
+from er_il.kinematics.rotation import Quaternion
 from er_il.policy.configuration import default_config
 from er_il.policy.training import PRECISION, Training, train_episodes
-from er_il.spaces.layout import Layout
-from er_il.spaces.registry import ERX, arm_space_from_spec, make_arm_space
-from er_il.spaces.spec import action_spec
+from er_il.spaces.registry import ERX
 from er_il.support.atomic_files import write_json
 from er_il.support.cost import Cost, measured
 from er_il.support.errors import ErIlError
@@ -85,11 +83,15 @@ class FitWeights(Job):
         from er_il.spaces.margin import demonstrated_weights
 
         (demonstrated,) = self.needs
-        source, arm = demonstrated.dataset(demonstrated.spaces[0]), Arm.preset(self.recipe.arm)
-        leader, _ = _training_paths(source, self.demonstrations)
-        fitted = arm.weighing(demonstrated_weights(arm, [path[:, : arm.dof] for path in leader]))
+        source = Dataset(demonstrated.dataset(demonstrated.spaces[0]))
+        leader, _ = _training_paths(source.root, self.demonstrations)
+        known = source.layout
+        weights = {
+            part.label: demonstrated_weights(part.space.arm, [known.angles(part, path) for path in leader])
+            for part in known.parts
+        }
         with SuppressProgressBars():
-            encode_dataset(Dataset(source), self.path, Layout.of_space(make_arm_space(ERX, fitted)))
+            encode_dataset(source, self.path, known.in_space(ERX, Quaternion.kind, weights))
 
 
 @dataclass(frozen=True)
@@ -191,15 +193,20 @@ class Film(Job):
 
 @lru_cache(maxsize=4)  # jobs of one policy follow one another
 def _demonstrated(training: Training) -> tuple[list[Array], ElbowReference | None]:
-    """The leader's paths (T, n + 1) [rad and opening] that a policy was trained on, and where the elbow was."""
-    info = Dataset(training.dataset).info
-    arm = arm_space_from_spec(action_spec(info["features"])).arm
+    """The leader's paths (T, n + 1) [rad and opening] that a policy was trained on, and where the elbow was.
+
+    The elbows of several arms are measured against nothing.
+    """
+    dataset = Dataset(training.dataset)
     leader, state = _training_paths(training.dataset, training.demonstrations)
-    return leader, ElbowReference.of_demos(arm, 1 / info["fps"], [path[:, : arm.dof] for path in state])
+    arm, *others = [part.space.arm for part in dataset.layout.parts]
+    if others:
+        return leader, None
+    return leader, ElbowReference.of_demos(arm, 1 / dataset.info["fps"], [path[:, : arm.dof] for path in state])
 
 
 def _training_paths(dataset: Path, demonstrations: int | None) -> tuple[list[Array], list[Array]]:
-    """The leader's paths (T, n + 1) [rad and opening] and the states (T, s) in the first training episodes."""
+    """The leader's joint vectors (T, D) [rad and openings] and the states (T, s) in the first training episodes."""
     episodes = read_episodes(dataset)
     chosen = [episodes[i] for i in train_episodes(Dataset(dataset).info)[:demonstrations]]
     return [demo.leader.astype(np.float64) for demo in chosen], [demo.state.astype(np.float64) for demo in chosen]

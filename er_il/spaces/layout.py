@@ -85,8 +85,18 @@ class Layout:
     @classmethod
     def of_space(cls, space: ArmSpace) -> "Layout":
         """One arm, its joints [rad] in order, then the gripper: what er_il records."""
-        joints = JointSpace(space.arm).names
-        return cls((*joints, GRIPPER), (Part("", space, Motors(joints, state=joints)),))
+        return cls.of_spaces({"": space})
+
+    @classmethod
+    def of_spaces(cls, spaces: Mapping[str, ArmSpace]) -> "Layout":
+        """Several arms by their labels, each one's joints [rad] in order, then its gripper: what er_il records."""
+        names: list[str] = []
+        parts = []
+        for label, space in spaces.items():
+            joints = JointSpace(space.arm).names
+            names += [*joints, f"{label}_{GRIPPER}" if label else GRIPPER]
+            parts.append(Part(label, space, Motors(joints, state=joints)))
+        return cls(tuple(names), tuple(parts))
 
     @property
     def kind(self) -> str:
@@ -98,6 +108,11 @@ class Layout:
         """Names of the dimensions that belong to no arm, such as grippers; encoding leaves them as they are."""
         used = {joint for part in self.parts for joint in part.motors.joints}
         return tuple(name for name in self.names if name not in used)
+
+    @cached_property
+    def other_indices(self) -> list[int]:
+        """Positions of :attr:`other_dimensions` in the joint vector."""
+        return [self.names.index(name) for name in self.other_dimensions]
 
     @cached_property
     def encoded_names(self) -> tuple[str, ...]:
@@ -141,12 +156,12 @@ class Layout:
 
     def split(self, vector: Array) -> tuple[list[Array], Array]:
         """Split joint vectors (..., D) into each arm's angles (..., n) [rad] and the other dimensions (..., k)."""
-        return [self.angles(part, vector) for part in self.parts], vector[..., self._others]
+        return [self.angles(part, vector) for part in self.parts], vector[..., self.other_indices]
 
     def join(self, angles: Sequence[Array], others: Array) -> Array:
         """The joint vectors (..., D) that :meth:`split` takes apart."""
         vector = np.empty((*others.shape[:-1], len(self.names)))
-        vector[..., self._others] = others
+        vector[..., self.other_indices] = others
         for part, q in zip(self.parts, angles, strict=True):
             vector[..., self.indices(part)] = part.motors.values(q)
         return vector
@@ -204,10 +219,6 @@ class Layout:
         of_arms = zip(self.parts, own, self.split(seeds)[0], self.split(currents)[0], strict=True)
         results = [part.space.decode_batch(*each) for part, *each in of_arms]
         return self.join([result.q for result in results], others), results
-
-    @cached_property
-    def _others(self) -> list[int]:
-        return [self.names.index(name) for name in self.other_dimensions]
 
     def fitted(self, vectors: ArrayLike) -> "Layout":
         """The same layout with the references (see :mod:`er_il.spaces.references`) that suit joint vectors (N, D)."""

@@ -7,8 +7,9 @@ from typing import Any
 
 import gymnasium
 
+from er_il.arms.robot import robot_with
 from er_il.datasets.record import RECORD, DatasetRecord
-from er_il.envs.protocol import arm_env
+from er_il.envs.protocol import robot_env
 from er_il.envs.tasks import task_id, task_names
 from er_il.evaluation.trace import SUFFIX, Trace
 from er_il.support.errors import DatasetError
@@ -50,13 +51,13 @@ def shapes_of(trace: Trace, environment: Mapping[str, Any] | None = None) -> lis
 
     Args:
         trace: The episode.
-        environment: Keyword arguments of the task's environment; the trace's arm if omitted.
+        environment: Keyword arguments of the task's environment; the robot of the trace's arm if omitted.
     """
     if trace.task not in task_names():
         return []
-    env = gymnasium.make(task_id(trace.task), **(environment or {"arm": trace.spec["arm"]["name"]}))
+    env = gymnasium.make(task_id(trace.task), **(environment or {"arm": robot_with(trace.spec["arm"]["name"])}))
     try:
         env.reset(seed=trace.seed)
-        return list(arm_env(env).scene_geometry())
+        return list(robot_env(env).scene_geometry())
     finally:
         env.close()

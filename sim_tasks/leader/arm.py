@@ -33,7 +33,7 @@ class LeaderArm:
         mujoco.mj_forward(self._model, data)
         before = script[0].gripper
         for segment in script:
-            targets = segment.sample(self._arm, self._period, speed)
+            targets = segment.sample(self._arm.velocity, self._period, speed)
             for target, opening in zip(targets, segment.openings(before, self._period, len(targets)), strict=True):
                 self._robot.command(data, target, opening)
                 mujoco.mj_step(self._model, data, nstep=self._substeps)

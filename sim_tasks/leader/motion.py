@@ -46,8 +46,8 @@ class Segment:
         times = np.arange(1, steps + 1) * period
         return np.interp(times, (0.0, self.closing), (before, self.gripper))
 
-    def sample(self, arm: Arm, period: float, speed: float) -> np.ndarray:
-        """Joint angles (T, n) every ``period`` seconds at a share ``speed`` of the velocity limits."""
+    def sample(self, velocity: Vector, period: float, speed: float) -> np.ndarray:
+        """Joint angles (T, n) every ``period`` seconds at a share ``speed`` of the velocity limits (n,) [rad/s]."""
         waypoints = self.waypoints
         still = np.tile(waypoints[-1], (round(self.hold / period), 1))
         if len(waypoints) < 2:
@@ -55,7 +55,7 @@ class Segment:
         knots = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(waypoints, axis=0), axis=1))])
         curve = PchipInterpolator(knots / knots[-1], waypoints)
         grid = np.linspace(0, 1, GRID)
-        fastest = np.max(np.abs(np.diff(curve(_ease(grid)), axis=0)) * (GRID - 1) / arm.velocity)  # [s] at full speed
+        fastest = np.max(np.abs(np.diff(curve(_ease(grid)), axis=0)) * (GRID - 1) / velocity)  # [s] at full speed
         steps = max(2, int(np.ceil(fastest / (speed * self.pace) / period)))
         return np.concatenate([curve(_ease(np.arange(1, steps + 1) / steps)), still])
 

@@ -1,5 +1,8 @@
 """Joint targets: what an action of a joint-level environment is, and what is none."""
 
+from collections.abc import Mapping
+from itertools import chain
+
 import gymnasium as gym
 import numpy as np
 
@@ -10,12 +13,16 @@ OVERSHOOT = 2 * np.pi  # [rad] by which a target may lie beyond its limit, to be
 
 
 class JointTargets:
-    """Targets (n+1,) of an arm's joints [rad] and the gripper's opening in [0, 1]."""
+    """Targets (n+1,) of an arm's joints [rad] and the gripper's opening in [0, 1]; of several arms, in turn."""
 
-    def __init__(self, arm: Arm) -> None:
-        lower, upper = np.append(arm.lower, 0.0), np.append(arm.upper, 1.0)
+    def __init__(self, arms: Mapping[str, Arm]) -> None:
+        """Targets of arms by their labels."""
+        lower = np.concatenate([np.append(arm.lower, 0.0) for arm in arms.values()])
+        upper = np.concatenate([np.append(arm.upper, 1.0) for arm in arms.values()])
         self.space = gym.spaces.Box(lower.astype(np.float32), upper.astype(np.float32))
-        self._names = (*arm.joints, "gripper")
+        self._names = tuple(
+            chain(*((*arm.joints, f"{label}_gripper" if label else "gripper") for label, arm in arms.items()))
+        )
         self._bounds = self.space.low.astype(np.float64), self.space.high.astype(np.float64)
 
     def checked(self, action: object) -> Vector:

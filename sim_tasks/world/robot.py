@@ -50,16 +50,23 @@ class RobotModel:
     bodies: frozenset[int]
 
     @classmethod
-    def of(cls, model: mujoco.MjModel, arm: Arm) -> "RobotModel":
-        """Look the robot up in a compiled model."""
-        root = model.body(arm.base_frame).id
+    def of(
+        cls,
+        model: mujoco.MjModel,
+        arm: Arm,
+        root: str | None = None,
+        fingers: tuple[str, str] = FINGERS,
+        gripper: str = GRIPPER,
+    ) -> "RobotModel":
+        """Look the robot up in a compiled model; ``root``: its lowest body, the arm's base if omitted."""
+        lowest = model.body(root or arm.base_frame).id
         return cls(
             joint_qpos=np.array([model.joint(joint).qposadr[0] for joint in arm.joints]),
             joint_dofs=np.array([model.joint(joint).dofadr[0] for joint in arm.joints]),
-            finger_qpos=np.array([model.joint(finger).qposadr[0] for finger in FINGERS]),
+            finger_qpos=np.array([model.joint(finger).qposadr[0] for finger in fingers]),
             actuators=np.array([model.actuator(joint).id for joint in arm.joints]),
-            gripper=model.actuator(GRIPPER).id,
-            bodies=frozenset(b for b in range(model.nbody) if descends(model, b, root)),
+            gripper=model.actuator(gripper).id,
+            bodies=frozenset(b for b in range(model.nbody) if descends(model, b, lowest)),
         )
 
     def place(self, data: mujoco.MjData, q: np.ndarray, opening: float) -> None:
@@ -86,10 +93,7 @@ class RobotModel:
 def robot_spec(arm: Arm) -> mujoco.MjSpec:
     """Build the robot: collision meshes of its URDF, position servos, gravity compensation."""
     spec = mujoco.MjSpec.from_string(_mujoco_urdf(arm))
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    spec.option.timestep = 0.002
-    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    spec.option.impratio = 10
+    set_physics(spec)
     for body in spec.bodies[1:]:
         body.gravcomp = 1
         for geom in body.geoms:
@@ -99,25 +103,44 @@ def robot_spec(arm: Arm) -> mujoco.MjSpec:
                 geom.friction = (1.2, 0.02, 0.0005)  # rubber tips
                 geom.condim = 4
     for joint in arm.joints:
-        urdf_joint = spec.joint(joint)
-        urdf_joint.armature = ARMATURE
-        urdf_joint.solref_limit, urdf_joint.solimp_limit = HARD_STOP, HARD
-        torque = float(urdf_joint.actfrcrange[1])
-        servo = spec.add_actuator(name=joint, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
-        servo.set_to_position(kp=next(kp for above, kp in STIFFNESS if torque > above), dampratio=1.0)
-        servo.forcerange = (-torque, torque)
-        servo.ctrlrange = urdf_joint.range
-    gripper = spec.add_actuator(name=GRIPPER, target=FINGERS[0], trntype=mujoco.mjtTrn.mjTRN_JOINT)
-    gripper.set_to_position(kp=FINGER_KP, kv=FINGER_KV)
-    gripper.forcerange = (-FINGER_FORCE, FINGER_FORCE)
-    gripper.ctrlrange = (0, FINGER_TRAVEL)
-    coupling = spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, name1=FINGERS[1], name2=FINGERS[0])
-    coupling.data[:2] = (0.0, 1.0)
+        add_servo(spec, joint)
+    add_gripper(spec, GRIPPER, FINGERS)
     # MuJoCo lets a link pass through the one that carries it, except where that one is fixed to the world.
     lowest = spec.joint(arm.joints[0]).parent
     for one, other in ((lowest.parent.name, lowest.name), *OVERLAPPING):
         spec.add_exclude(bodyname1=one, bodyname2=other)
     return spec
+
+
+def set_physics(spec: mujoco.MjSpec) -> None:
+    """Choose how a world with a robot is integrated, and its friction."""
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.timestep = 0.002
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    spec.option.impratio = 10
+
+
+def add_servo(spec: mujoco.MjSpec, name: str) -> None:
+    """Give a joint a position servo as strong as its actuator force range [Nm], and hard stops."""
+    joint = spec.joint(name)
+    joint.armature = ARMATURE
+    joint.solref_limit, joint.solimp_limit = HARD_STOP, HARD
+    torque = float(joint.actfrcrange[1])
+    servo = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    servo.set_to_position(kp=next(kp for above, kp in STIFFNESS if torque > above), dampratio=1.0)
+    servo.forcerange = (-torque, torque)
+    servo.ctrlrange = joint.range
+
+
+def add_gripper(spec: mujoco.MjSpec, name: str, fingers: tuple[str, str]) -> None:
+    """Drive two finger joints [m] by one actuator."""
+    one, other = fingers
+    gripper = spec.add_actuator(name=name, target=one, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    gripper.set_to_position(kp=FINGER_KP, kv=FINGER_KV)
+    gripper.forcerange = (-FINGER_FORCE, FINGER_FORCE)
+    gripper.ctrlrange = (0, FINGER_TRAVEL)
+    coupling = spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, name1=other, name2=one)
+    coupling.data[:2] = (0.0, 1.0)
 
 
 def shoulder_offset(arm: Arm) -> float:

@@ -8,6 +8,7 @@ from sim_tasks.world.props import BOX
 from sim_tasks.world.robot import robot_spec, shoulder_offset
 
 BENCH_CENTRE, BENCH_SIZE = (0.4, 0.0), (1.3, 1.1)  # [m] x, y; its sides
+FLOOR = -0.75  # [m] below the base
 
 # name: colour, specular, shininess, reflectance
 MATERIALS = {
@@ -26,6 +27,24 @@ MATERIALS = {
 def scene_spec(arm: Arm) -> mujoco.MjSpec:
     """Build the empty scene around a robot; tasks add their things to it."""
     spec = robot_spec(arm)
+    add_room(spec)
+    world = spec.worldbody
+    # The bench stands 1 mm below the robot's base, so that their touching is no collision.
+    (x, y), (length, width) = BENCH_CENTRE, BENCH_SIZE
+    bench = (length / 2, width / 2, 0.02)
+    world.add_geom(name="bench", type=BOX, size=bench, pos=(x, y, -0.021), material="bench")
+    for x in (-0.2, 1.0):
+        for y in (-0.5, 0.5):
+            world.add_geom(
+                type=BOX, size=(0.025, 0.025, 0.355), pos=(x, y, -0.395), material="bench", contype=0, conaffinity=0
+            )
+    for view in VIEWS:
+        view.add(spec, shoulder_offset(arm))
+    return spec
+
+
+def add_room(spec: mujoco.MjSpec) -> None:
+    """Add what is around every robot: lights, sky, floor, and the materials of things."""
     visual = spec.visual
     visual.headlight.ambient, visual.headlight.diffuse = (0.35, 0.35, 0.35), (0.35, 0.35, 0.35)
     visual.headlight.specular = (0.1, 0.1, 0.1)
@@ -43,20 +62,8 @@ def scene_spec(arm: Arm) -> mujoco.MjSpec:
     world.add_geom(
         type=mujoco.mjtGeom.mjGEOM_PLANE,
         size=(3, 3, 0.1),
-        pos=(0, 0, -0.75),
+        pos=(0, 0, FLOOR),
         material="ground",
         contype=0,
         conaffinity=0,
     )
-    # The bench stands 1 mm below the robot's base, so that their touching is no collision.
-    (x, y), (length, width) = BENCH_CENTRE, BENCH_SIZE
-    bench = (length / 2, width / 2, 0.02)
-    world.add_geom(name="bench", type=BOX, size=bench, pos=(x, y, -0.021), material="bench")
-    for x in (-0.2, 1.0):
-        for y in (-0.5, 0.5):
-            world.add_geom(
-                type=BOX, size=(0.025, 0.025, 0.355), pos=(x, y, -0.395), material="bench", contype=0, conaffinity=0
-            )
-    for view in VIEWS:
-        view.add(spec, shoulder_offset(arm))
-    return spec

@@ -38,7 +38,7 @@ class MovesLeader[Task: ObjectTask](Leader[Task]):
 
     @cached_property
     def _collisions(self) -> Collisions:
-        return Collisions(self._world.world_spec(), self._world.arm, self.avoid, self.clearance)
+        return Collisions.of_arm(self._world.world_spec(), self._world.arm, self.avoid, self.clearance)
 
     def _script(self, rng: np.random.Generator) -> tuple[Sequence[Segment], float]:
         world, moves = self._world, self._moves(rng)

@@ -35,7 +35,7 @@ class PickLeader[Task: PickTask](Leader[Task]):
 
     @cached_property
     def _collisions(self) -> Collisions:
-        return Collisions(self._world.world_spec(), self._world.arm, self._obstacles(), self.clearance)
+        return Collisions.of_arm(self._world.world_spec(), self._world.arm, self._obstacles(), self.clearance)
 
     def _script(self, rng: np.random.Generator) -> tuple[Sequence[Segment], float]:
         world = self._world
