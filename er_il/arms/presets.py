@@ -6,6 +6,7 @@ from functools import partial
 from math import pi
 from pathlib import Path
 
+from er_il.arms.fr3 import fr3_urdf
 from er_il.arms.gen3 import gen3_urdf
 from er_il.arms.panda8 import panda8_urdf
 from er_il.arms.urdf import example_robot_data
@@ -31,6 +32,13 @@ PRESETS = {
         base_frame="panda_link0",
         ee_frame="panda_hand_tcp",
         joints=PANDA_JOINTS,
+        home=PANDA_HOME,
+    ),
+    "fr3": Preset(
+        fr3_urdf,
+        base_frame="fr3_link0",
+        ee_frame="fr3_hand_tcp",
+        joints=tuple(f"fr3_joint{i}" for i in range(1, 8)),
         home=PANDA_HOME,
     ),
     "panda8": Preset(

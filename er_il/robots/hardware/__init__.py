@@ -1,11 +1,23 @@
-"""The simulated follower and the scripted leader as LeRobot hardware, for its stock commands.
+"""Arms as LeRobot hardware, for its stock commands: simulated ones, and Franka's.
 
 ``lerobot-teleoperate``, ``lerobot-record``, ``lerobot-replay`` and ``lerobot-rollout`` know them as
-``--robot.type=er_il_sim`` and ``--teleop.type=er_il_scripted_leader``. LeRobot looks a device class
-up here by its configuration's name, without ``Config``.
+``--robot.type=er_il_sim`` with ``--teleop.type=er_il_scripted_leader``, and ``--robot.type=er_il_franka`` with
+``--teleop.type=er_il_franka_leader``. LeRobot looks a device class up here by its configuration's name, without
+``Config``.
 """
 
 from er_il.robots.hardware.follower import SimFollower, SimFollowerConfig
+from er_il.robots.hardware.franka_follower import FrankaFollower, FrankaFollowerConfig
+from er_il.robots.hardware.franka_leader import FrankaLeader, FrankaLeaderConfig
 from er_il.robots.hardware.leader import ScriptedLeader, ScriptedLeaderConfig
 
-__all__ = ["ScriptedLeader", "ScriptedLeaderConfig", "SimFollower", "SimFollowerConfig"]
+__all__ = [
+    "FrankaFollower",
+    "FrankaFollowerConfig",
+    "FrankaLeader",
+    "FrankaLeaderConfig",
+    "ScriptedLeader",
+    "ScriptedLeaderConfig",
+    "SimFollower",
+    "SimFollowerConfig",
+]

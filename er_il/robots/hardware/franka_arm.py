@@ -1,0 +1,191 @@
+"""A Franka arm through its control interface (FCI): the part of ``franka-rs`` that er_il uses, and its errors in words.
+
+The 1 kHz loop runs inside that library, on a thread of its own that does not wait for Python: it moves the arm to the
+latest target under limits of velocity, acceleration and jerk, as a spring and a damper in joint space, and holds it
+there.
+"""
+
+import logging
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+
+from er_il.arms.arm import Vector
+from er_il.support.errors import ReflexError, RobotError
+
+logger = logging.getLogger(__name__)
+
+FCI_VERSIONS = {"fr3": 10, "panda": 5}  # arm -> version of its protocol
+# Of the spring and the damper in the joints [Nms/rad, Nm/rad]. The damping is that of Franka's example of joint
+# impedance; the stiffness is in proportion to it, so that all joints lag by the same 83 ms, and the arm's way is kept.
+DAMPING = (50.0, 50.0, 50.0, 50.0, 30.0, 25.0, 15.0)
+STIFFNESS = tuple(12.0 * damping for damping in DAMPING)
+WHOLE_RANGE = 2 * np.pi  # [rad] the loop's own limit on the way from its start: none that a joint could reach
+
+# Mode in which the arm takes no motion -> what to do about it.
+BLOCKING_MODES = {
+    "other": "Unlock its joints and activate FCI in Desk.",
+    "guiding": "It is being guided by hand: let go of its buttons.",
+    "user_stopped": "Its stop button is pressed, or it is in programming mode: release it, or change to execution.",
+    "move": "Another program moves it: end that program.",
+}
+# Part of a failure's name -> what to do about it.
+REMEDIES = {
+    "communication_constraints": "Packets were lost or late: connect this computer straight to the control box by "
+    "cable, use a real-time kernel, and end what else keeps the computer busy.",
+    "reflex": "It has touched something: see that its way is free.",
+    "collision": "It has come close to itself, or touched something: see that its way is free.",
+    "limits": "It was about to exceed one of its limits: lower the speed.",
+}
+AGAIN = "The arm holds. Starting again recovers it."
+
+
+def library() -> Any:
+    """The module ``franka``.
+
+    Raises:
+        RobotError: it is not installed.
+    """
+    try:
+        import franka  # pyright: ignore[reportMissingImports]
+    except ImportError as error:
+        raise RobotError(
+            "Franka arms need the package franka-rs: install er_il with its extra `franka`, as in "
+            "pip install 'lerobot_env_er_il[franka]'."
+        ) from error
+    return franka
+
+
+class FrankaArm:
+    """One arm, connected on construction: read, and moved between :meth:`start` and :meth:`close`."""
+
+    def __init__(self, address: str) -> None:
+        """Connect to the control box at an address.
+
+        Raises:
+            RobotError: the library is missing, or nothing answers there.
+        """
+        self.address = address
+        self._library = library()
+        self._targets: Any = None
+        # The library raises the thread that connects to real-time priority, if it may: not ours, which also computes.
+        with ThreadPoolExecutor(max_workers=1) as connecting:
+            self._robot: Any = self._told(connecting.submit(self._library.Robot, address).result)
+
+    def check_kind(self, arm: str) -> None:
+        """Check that it is an arm of that name.
+
+        Raises:
+            RobotError: it is another kind, whose limits differ.
+        """
+        version = self._robot.fci_version
+        if version != FCI_VERSIONS[arm]:
+            kinds = [name for name, each in FCI_VERSIONS.items() if each == version]
+            raise RobotError(
+                f"The arm at {self.address} is no {arm}: it speaks version {version} of the protocol"
+                + (f", as does {kinds[0]}." if kinds else ".")
+            )
+
+    def measure(self) -> Vector:
+        """Joint angles (7,) [rad].
+
+        Raises:
+            RobotError: the connection is lost.
+        """
+        read = self._robot.read_once if self._targets is None else self._targets.state
+        return np.asarray(self._told(read).q, dtype=np.float64)
+
+    def start(self, speed: float, torque: float, force: float) -> None:
+        """Recover the arm if a reflex has stopped it, and take over its motion; it holds where it is.
+
+        Args:
+            speed: Share of the joints' limits of velocity, acceleration and jerk, in (0, 1].
+            torque: External torque at a joint [Nm] that stops the arm by a reflex.
+            force: External force [N] and moment [Nm] at the end effector that do.
+
+        Raises:
+            RobotError: the arm is not ready.
+        """
+        mode = self._told(self._robot.read_once).robot_mode
+        if mode == "reflex":
+            self._told(self._robot.automatic_error_recovery)
+            logger.warning("The arm at %s had stopped by a reflex; it is recovered.", self.address)
+        elif mode in BLOCKING_MODES:
+            raise RobotError(f"The arm at {self.address} is not ready. {BLOCKING_MODES[mode]}")
+        torques, forces = [torque] * 7, [force] * 6
+        self._told(lambda: self._robot.set_collision_behavior_simple(torques, torques, forces, forces))
+        self._targets = self._told(
+            lambda: self._robot.joint_targets(
+                fraction=speed, max_deviation=WHOLE_RANGE, joint_stiffness=STIFFNESS, joint_damping=DAMPING
+            )
+        )
+
+    @property
+    def moving(self) -> bool:
+        """True from :meth:`start` until the motion ends, for whatever reason."""
+        return self._targets is not None and self._targets.running
+
+    def aim(self, q: Vector) -> None:
+        """Move towards joint angles (7,) [rad], at least 0.05 rad within the joint limits; returns at once.
+
+        Raises:
+            RobotError: the motion has ended; :meth:`end` says why.
+        """
+        self._told(lambda: self._targets.move_to(q))
+
+    def end(self) -> RobotError | None:
+        """End the motion, arrived at the last target; what had ended it before, if anything has."""
+        targets, self._targets = self._targets, None
+        if targets is None:
+            return None
+        try:
+            self._told(targets.stop)
+        except RobotError as error:
+            return error
+        return None
+
+    def hand(self) -> Any:
+        """Connect to the arm's hand.
+
+        Raises:
+            RobotError: it has none, or none is configured in Desk.
+        """
+        try:
+            return self._told(self._robot.gripper)
+        except RobotError as error:
+            raise RobotError(f"{error} If the arm has no hand, set gripper to false.") from error
+
+    def close(self) -> None:
+        """End the motion and the connection; the arm holds."""
+        self.end()
+        self._robot = None
+
+    def _told(self, ask: Callable[[], Any]) -> Any:
+        """Ask the library, and put its errors in words."""
+        return in_words(self.address, ask)
+
+
+def in_words(address: str, ask: Callable[[], Any]) -> Any:
+    """The answer of the library about an arm at an address.
+
+    Raises:
+        ReflexError: the arm has stopped its motion by itself.
+        RobotError: anything else went wrong.
+    """
+    try:
+        return ask()
+    except library().ControlException as error:
+        reasons = ", ".join(error.errors) or str(error)
+        remedies = [remedy for part, remedy in REMEDIES.items() if part in reasons]
+        raise ReflexError(" ".join([f"The arm at {address} has stopped ({reasons}).", *remedies[:1], AGAIN])) from error
+    except library().FrankaError as error:
+        if error.kind == "network":
+            said = f"There is no connection to {address} ({error}). A moving arm stops by itself. Check its power, its "
+            said += "cable and that FCI is active in Desk."
+        elif error.kind == "realtime":
+            said = f"{error}. Use a real-time kernel, or, for a simulated arm only, set FRANKA_REALTIME=ignore."
+        else:
+            said = f"The arm at {address} refuses ({error.kind}): {error}"
+        raise RobotError(said) from error
