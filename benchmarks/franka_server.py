@@ -27,6 +27,7 @@ from franka_sim.franka_sim_server import FrankaSimServer
 HOME = (0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785)  # [rad]
 LOG_PERIOD = 0.01  # [s]
 GUIDE_PERIOD = 0.002  # [s]
+BLEND = 1.0  # [s] of leading the arm onto a path
 REFLEX = 6  # index of joint_reflex among the protocol's errors: an external torque above its threshold
 
 
@@ -71,10 +72,11 @@ class Server(FrankaSimServer):
     def guide(self, path):
         """Lead the held arm along a path, as a hand does that overcomes its weight."""
         rows = np.loadtxt(path, delimiter=",", ndmin=2)
-        start = time.monotonic()
+        here, start = self.physics_sim.get_robot_state()["q"], time.monotonic()
         while (passed := time.monotonic() - start) <= rows[-1, 0]:
             q = np.array([np.interp(passed, rows[:, 0], rows[:, joint]) for joint in range(1, 8)])
-            self.physics_sim.update_joint_positions(q)
+            blend = min(1.0, passed / BLEND)  # from where the arm is
+            self.physics_sim.update_joint_positions((1.0 - blend) * here + blend * q)
             self.gripper_server.backend.move(float(np.interp(passed, rows[:, 0], rows[:, 8])), speed=0.1)
             time.sleep(GUIDE_PERIOD)
 
@@ -90,7 +92,9 @@ class Server(FrankaSimServer):
                 threading.Thread(target=self.guide, args=values, daemon=True).start()
 
     def log(self, path):
-        """Write the arm's state for ever."""
+        """Write the arm's state for ever, once there is one."""
+        while not self.physics_sim.running:
+            time.sleep(LOG_PERIOD)
         with Path(path).open("w", newline="") as file:
             writer = csv.writer(file)
             while True:

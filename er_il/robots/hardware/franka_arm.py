@@ -19,9 +19,11 @@ logger = logging.getLogger(__name__)
 
 FCI_VERSIONS = {"fr3": 10, "panda": 5}  # arm -> version of its protocol
 # Of the spring and the damper in the joints [Nms/rad, Nm/rad]. The damping is that of Franka's example of joint
-# impedance; the stiffness is in proportion to it, so that all joints lag by the same 83 ms, and the arm's way is kept.
+# impedance; the stiffness is in proportion to it, so that all joints lag equally and the arm keeps its path.
 DAMPING = (50.0, 50.0, 50.0, 50.0, 30.0, 25.0, 15.0)
-STIFFNESS = tuple(12.0 * damping for damping in DAMPING)
+LAG = 1 / 12  # [s]
+STIFFNESS = tuple(damping / LAG for damping in DAMPING)
+ACCELERATION = 7.5  # [rad/s²] the lowest limit of a joint of both arms
 WHOLE_RANGE = 2 * np.pi  # [rad] the loop's own limit on the way from its start: none that a joint could reach
 
 # Mode in which the arm takes no motion -> what to do about it.
@@ -70,6 +72,7 @@ class FrankaArm:
         self.address = address
         self._library = library()
         self._targets: Any = None
+        self._speed = 1.0
         # The library raises the thread that connects to real-time priority, if it may: not ours, which also computes.
         with ThreadPoolExecutor(max_workers=1) as connecting:
             self._robot: Any = self._told(connecting.submit(self._library.Robot, address).result)
@@ -94,8 +97,17 @@ class FrankaArm:
         Raises:
             RobotError: the connection is lost.
         """
-        read = self._robot.read_once if self._targets is None else self._targets.state
-        return np.asarray(self._told(read).q, dtype=np.float64)
+        return np.asarray(self._state().q, dtype=np.float64)
+
+    def rest(self) -> Vector:
+        """Joint angles (7,) [rad] at which the arm comes to rest if it brakes now.
+
+        Raises:
+            RobotError: the connection is lost.
+        """
+        state = self._state()
+        q, dq = np.asarray(state.q, dtype=np.float64), np.asarray(state.dq, dtype=np.float64)
+        return q + LAG * dq + dq * np.abs(dq) / (2.0 * self._speed * ACCELERATION)
 
     def start(self, speed: float, torque: float, force: float) -> None:
         """Recover the arm if a reflex has stopped it, and take over its motion; it holds where it is.
@@ -115,6 +127,7 @@ class FrankaArm:
         elif mode in BLOCKING_MODES:
             raise RobotError(f"The arm at {self.address} is not ready. {BLOCKING_MODES[mode]}")
         torques, forces = [torque] * 7, [force] * 6
+        self._speed = speed
         self._told(lambda: self._robot.set_collision_behavior_simple(torques, torques, forces, forces))
         self._targets = self._told(
             lambda: self._robot.joint_targets(
@@ -161,6 +174,9 @@ class FrankaArm:
         """End the motion and the connection; the arm holds."""
         self.end()
         self._robot = None
+
+    def _state(self) -> Any:
+        return self._told(self._robot.read_once if self._targets is None else self._targets.state)
 
     def _told(self, ask: Callable[[], Any]) -> Any:
         """Ask the library, and put its errors in words."""

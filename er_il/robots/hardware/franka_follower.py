@@ -54,7 +54,7 @@ class FrankaFollowerConfig(RobotConfig):
         collision_torque: External torque at a joint [Nm] that stops the arm.
         collision_force: External force [N] or moment [Nm] at the end effector that stops the arm.
         grasp_force: Force of the fingers on what they close around [N].
-        timeout: Seconds without an action after which the arm holds where it is.
+        timeout: Seconds without an action after which the arm brakes, and holds.
         cameras: LeRobot's cameras by name.
     """
 
@@ -66,15 +66,15 @@ class FrankaFollowerConfig(RobotConfig):
     collision_torque: float = 40.0
     collision_force: float = 40.0
     grasp_force: float = 20.0
-    timeout: float = 0.5
+    timeout: float = 0.25
     cameras: dict[str, CameraConfig] = field(default_factory=dict)
 
 
 class FrankaFollower(NeedsNoCalibration, Robot):
     """A follower that moves to joint positions, within its limits, at no more than its share of full speed.
 
-    - An action is limited to what the arm can do since the last one, so when actions end the arm does, too. Without
-      one for ``timeout`` it holds where it is. One that is not finite leaves the last standing.
+    - An action is limited to what full speed allows since the last one. Without one for ``timeout`` the arm brakes and
+      holds. One that is not finite leaves the last standing.
     - A reflex ends the program with one line; between two episodes, and when it connects, the arm is recovered.
     - Disconnecting, also by Ctrl-C, ends the motion; the arm holds.
     """
@@ -218,14 +218,12 @@ class FrankaFollower(NeedsNoCalibration, Robot):
         self._start(arm)
 
     def _hold(self) -> None:
-        """Hold where the arm is, called by the watchdog."""
+        """Brake and hold, called by the watchdog."""
         arm = self._arm
         with self._aiming, suppress(RobotError):  # if it has stopped, the next call of LeRobot's tells why
             if arm is None or not arm.moving:
                 return
-            q = arm.measure()
-            self._guard.anchor(q)
-            arm.aim(self._guard.target(q, self.config.timeout))
+            arm.aim(self._guard.brake(arm.measure(), arm.rest()))
             logger.warning("No action for %g s: the arm holds until the next one.", self.config.timeout)
 
     def _warn_of(self, wanted: Vector) -> None:

@@ -6,10 +6,7 @@ from er_il.arms.arm import Vector
 
 
 class JointGuard:
-    """Keeps joint targets finite, within limits, and within the way that full speed allows from the last one.
-
-    So whatever stops asking, the arm ends within one step and its own braking of where it is.
-    """
+    """Keeps joint targets finite, within limits, and within the way that full speed allows from the last one."""
 
     def __init__(self, lower: Vector, upper: Vector, velocity: Vector) -> None:
         """Guard joints with position limits (n,) [rad] and a velocity limit (n,) [rad/s]."""
@@ -28,10 +25,24 @@ class JointGuard:
         Raises:
             RuntimeError: :meth:`anchor` was never called.
         """
+        last = self._anchored()
+        if np.all(np.isfinite(wanted)):
+            step = np.clip(wanted, self._lower, self._upper) - last
+            share = np.max(np.abs(step) / self._velocity) / passed  # of the way that full speed allows
+            last = self._last = last + step / max(1.0, share)
+        return last
+
+    def brake(self, q: Vector, rest: Vector) -> Vector:
+        """The target (n,) [rad] at which an arm at q (n,) [rad] stops: where it can come to rest, or the last before.
+
+        Raises:
+            RuntimeError: :meth:`anchor` was never called.
+        """
+        last = self._anchored()
+        self._last = np.clip(rest, np.minimum(q, last), np.maximum(q, last))
+        return self._last
+
+    def _anchored(self) -> Vector:
         if self._last is None:
             raise RuntimeError("JointGuard.anchor must be called before the first target.")
-        if np.all(np.isfinite(wanted)):
-            step = np.clip(wanted, self._lower, self._upper) - self._last
-            share = np.max(np.abs(step) / self._velocity) / passed  # of the way that full speed allows
-            self._last = self._last + step / max(1.0, share)
         return self._last
