@@ -144,6 +144,7 @@ def period(file: Path) -> dict[str, float]:
         "period_p50_ms": round(1e3 * float(np.percentile(periods, 50)), 2),
         "period_p99_ms": round(1e3 * float(np.percentile(periods, 99)), 2),
         "work_p50_ms": round(1e3 * float(np.percentile(work, 50)), 2),
+        "work_p90_ms": round(1e3 * float(np.percentile(work, 90)), 2),
         "work_p99_ms": round(1e3 * float(np.percentile(work, 99)), 2),
     }
 
@@ -159,7 +160,9 @@ def chain(session: Session, follower: SimulatedFranka, leader: SimulatedFranka, 
     report: dict[str, Any] = {}
 
     start = time.monotonic()
-    there_and_back = np.concatenate([motion(5.0, 0), motion(5.0, 0, back=True) + [5.0, *[0.0] * 8]])
+    returning = motion(5.0, 0, back=True)
+    returning[:, 0] += 5.0
+    there_and_back = np.concatenate([motion(5.0, 0), returning])
     begun = threading.Event()
 
     def lead_once(line: str) -> None:
@@ -250,7 +253,13 @@ def main() -> None:
             looking.kill()
             looking.wait()
     faults = fault_table(python, folder / "faults")
-    whole = {"meta": provenance(), "commands": session.commands, "chain": report, "faults": faults}
+    pace = {arm.address: arm.pace() for arm in (follower, leader)}
+    whole = {
+        "meta": provenance() | {"slowest_physics_of_real_time": pace},
+        "commands": session.commands,
+        "chain": report,
+        "faults": faults,
+    }
     (RESULTS / "report.json").write_text(json.dumps(whole, indent=2) + "\n")
     print(json.dumps(whole, indent=2))
 

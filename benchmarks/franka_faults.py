@@ -3,6 +3,7 @@
 Their server is strict here: like a real control box it stops a motion after 20 lost packets, or for a broken limit.
 """
 
+import logging
 import os
 import signal
 import subprocess
@@ -136,16 +137,16 @@ def action_faults(follower: SimulatedFranka) -> list[dict[str, Any]]:
     """Actions that no policy should send, or that do not come."""
     arm = Arm.preset("fr3")
     home, rows = arm.home, []
-    far = home + [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    turn = np.eye(7)[0]  # [rad] of the first joint
     robot = FrankaFollower(FrankaFollowerConfig(address=follower.address, speed=SPEED))
     robot.connect()
     for name, sent in {
         "no action any more": None,
         "actions of NaN": np.full(7, np.nan),
-        "one jump by 2 rad, then nothing": far + [1.0, *[0.0] * 6],
+        "one jump by 2 rad, then nothing": home + 3 * turn,
     }.items():
         drive(robot, home, 80)
-        drive(robot, far, 14)
+        drive(robot, home + turn, 14)
         at = time.monotonic()
         if sent is not None:
             drive(robot, sent, 1 if "jump" in name else 40)
@@ -168,6 +169,12 @@ def action_faults(follower: SimulatedFranka) -> list[dict[str, Any]]:
         }
     )
     drive(robot, home, 120)
+    logging.getLogger().setLevel(logging.INFO)
+    logging.info("Reset the environment")  # as lerobot-record says between two episodes
+    follower.tell("reflex")
+    time.sleep(0.3)
+    drive(robot, home, 20)
+    rows.append({"fault": "reflex between two episodes", "arm": "is recovered, and goes on"})
     try:
         robot.send_action({"pos_x": 0.3})
     except ErIlError as error:

@@ -1,6 +1,7 @@
 """Simulated Franka arms as processes: the environment of their server, and one arm's life in it."""
 
 import os
+import re
 import shutil
 import socket
 import subprocess
@@ -102,6 +103,11 @@ class SimulatedFranka:
         """States (T, 10) since the start: time [s], mode, seven joint angles [rad], width of the hand [m]."""
         lines = self.states_file.read_text().splitlines()
         return np.array([[float(value) for value in line.split(",")] for line in lines if line.count(",") == 9])
+
+    def pace(self) -> float:
+        """The slowest that its physics ran, as a share of real time: below 1 the computer was too slow for it."""
+        said = (self.folder / f"{self.address}.log").read_text()
+        return min([1.0, *map(float, re.findall(r"running at ([\d.]+)x real time", said))])
 
     def _answers(self) -> bool:
         # The command port is open from the beginning; states are written once physics runs.

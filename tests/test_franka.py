@@ -33,7 +33,7 @@ class FrankaError(Exception):
         self.kind = kind
 
 
-class ControlException(FrankaError):
+class ControlException(FrankaError):  # noqa: N818 franka-rs calls it so
     def __init__(self, *errors: str) -> None:
         super().__init__("control", "aborted")
         self.errors = list(errors)
@@ -175,7 +175,8 @@ def test_the_follower_speaks_degrees_and_openings(follower: FrankaFollower, box:
 def test_a_far_action_is_approached_at_the_share_of_full_speed_in_its_direction(
     follower: FrankaFollower, box: FakeRobot
 ):
-    start, far = FR3.home, FR3.home + [1.0, 0.5, 0.0, 0.0, -0.25, 0.0, 0.0]
+    start = FR3.home
+    far = start + np.array([1.0, 0.5, 0.0, 0.0, -0.25, 0.0, 0.0])
     before = time.monotonic()
     follower.send_action(action(start))
     for _ in range(5):
