@@ -17,7 +17,7 @@ import numpy as np
 import zmq
 from numpy.typing import NDArray
 
-PERIOD = 1 / 30  # [s]
+PERIOD = 1 / 25  # [s]
 TAIL = 1000  # [bytes] of the log that hold its last full line
 VIEW = {"distance": 1.9, "azimuth": 140.0, "elevation": -22.0, "lookat": (0.25, 0.0, 0.45)}
 

@@ -181,7 +181,7 @@ def chain(session: Session, follower: SimulatedFranka, leader: SimulatedFranka, 
         ["lerobot-record", *robot, *TELEOP, "--dataset.repo_id=me/reach", "--dataset.root=reach",
          f"--dataset.fps={RATE}", f"--dataset.num_episodes={EPISODES}", f"--dataset.episode_time_s={EPISODE_TIME:g}",
          f"--dataset.reset_time_s={RESET_TIME:g}", "--dataset.single_task=Reach.", "--dataset.push_to_hub=false",
-         "--play_sounds=false"], guide,
+         "--dataset.video=false", "--play_sounds=false"], guide,
     )  # fmt: skip
     report["record"] = period(session.folder / "lerobot-record.csv")
     guide.lead(motion(RESET_TIME, EPISODES - 1, back=True))

@@ -42,8 +42,8 @@ SHOWN_ONLY = {"yaml", "text"}  # languages of blocks that hold no commands
 
 
 def prepare_real_arm(folder: Path) -> None:
-    panda, xarm = Arm.preset("panda"), Arm.preset("xarm7")
-    write_one_arm(folder / "demos/franka", panda, [f"{joint}.pos" for joint in panda.joints])
+    fr3, xarm = Arm.preset("fr3"), Arm.preset("xarm7")
+    write_one_arm(folder / "demos/franka", fr3, [f"{joint}.pos" for joint in fr3.joints], degrees=True)
     write_one_arm(folder / "demos/xarm", xarm, [f"joint{i}.pos" for i in range(1, 8)], degrees=True)
     write_openarm(folder)
 

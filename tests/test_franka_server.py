@@ -1,6 +1,7 @@
 """Franka arms as LeRobot hardware, over the arms' own protocol, on simulated control boxes."""
 
 import os
+import socket
 import subprocess
 import sys
 import time
@@ -8,14 +9,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from documented import ROOT, documented
 from lerobot.datasets import LeRobotDataset
 from lerobot.scripts import lerobot_record
 from operating import EPISODE_TIME, right_arrow_after
-from simulated_franka import SimulatedFranka, server_environment
+from simulated_franka import COMMAND_PORT, STARTS_WITHIN, SimulatedFranka, server_environment
 
 from er_il import cli
 from er_il.arms.arm import Arm
 from er_il.robots.hardware import FrankaFollower, FrankaFollowerConfig
+from er_il.robots.hardware.franka_arm import FrankaArm
 from er_il.spaces.layout import Layout
 from er_il.support.errors import ReflexError, RobotError
 
@@ -122,3 +125,21 @@ def test_the_arm_is_where_it_was_told_to_be_and_no_faster_than_allowed(python: P
     np.testing.assert_allclose(states[-1, 2:9], HOME + 2 * REACH, atol=0.01)
     speed = np.abs((states[10:, 2:9] - states[:-10, 2:9]) / (states[10:, :1] - states[:-10, :1]))
     assert np.all(speed.max(axis=0) < 0.6 * Arm.preset("fr3").velocity)
+
+
+def test_the_documented_commands_start_a_control_box(python: Path, tmp_path: Path):
+    script, *arguments = documented("docs/real_arm.md", "python benchmarks/franka_model.py")
+    subprocess.run([sys.executable, ROOT / script, *arguments], cwd=tmp_path, check=True)
+    script, *arguments = documented("docs/real_arm.md", "franka-sim/bin/python benchmarks/franka_server.py")
+    address = arguments[-1]
+    server = subprocess.Popen([python, ROOT / script, *arguments], cwd=tmp_path, stdin=subprocess.PIPE)
+    try:
+        until = time.monotonic() + STARTS_WITHIN
+        while socket.socket().connect_ex((address, COMMAND_PORT)) and time.monotonic() < until:
+            time.sleep(0.1)
+        arm = FrankaArm(address)
+        np.testing.assert_allclose(arm.measure(), HOME, atol=0.01)
+        arm.close()
+    finally:
+        server.kill()
+        server.wait()

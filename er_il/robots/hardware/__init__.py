@@ -7,8 +7,9 @@
 """
 
 from er_il.robots.hardware.follower import SimFollower, SimFollowerConfig
-from er_il.robots.hardware.franka_follower import FrankaFollower, FrankaFollowerConfig
-from er_il.robots.hardware.franka_leader import FrankaLeader, FrankaLeaderConfig
+from er_il.robots.hardware.franka_config import FrankaFollowerConfig, FrankaLeaderConfig
+from er_il.robots.hardware.franka_follower import FrankaFollower
+from er_il.robots.hardware.franka_leader import FrankaLeader
 from er_il.robots.hardware.leader import ScriptedLeader, ScriptedLeaderConfig
 
 __all__ = [

@@ -4,70 +4,29 @@ import logging
 import threading
 import time
 from contextlib import suppress
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from lerobot.cameras import CameraConfig, make_cameras_from_configs
+from lerobot.cameras import make_cameras_from_configs
 from lerobot.lerobot_types import RobotAction, RobotObservation
-from lerobot.robots import Robot, RobotConfig
+from lerobot.robots import Robot
 from lerobot.utils.decorators import check_if_already_connected, check_if_not_connected
 
-from er_il.arms.arm import Arm, Vector
+from er_il.arms.arm import Vector
 from er_il.robots.hardware.calibration import NeedsNoCalibration
 from er_il.robots.hardware.episodes import EpisodeAnnouncements
-from er_il.robots.hardware.franka_arm import FCI_VERSIONS, FrankaArm
+from er_il.robots.hardware.franka_arm import FrankaArm
+from er_il.robots.hardware.franka_config import FrankaFollowerConfig, franka_arm
 from er_il.robots.hardware.franka_hand import FrankaHand
 from er_il.robots.hardware.joint_guard import JointGuard
 from er_il.robots.hardware.joints import JointNames
 from er_il.robots.hardware.watchdog import Watchdog
-from er_il.support.errors import NumbersError, ReflexError, RobotError, UnknownNameError
+from er_il.support.errors import NumbersError, ReflexError, RobotError
 from er_il.support.uncaught import tell_uncaught_in_one_line
 
 logger = logging.getLogger(__name__)
 
 MARGIN = 0.06  # [rad] to the joint limits; franka-rs refuses targets within 0.05 rad
-
-
-def franka_arm(name: str) -> Arm:
-    """The arm of that name, one of those that speak Franka's protocol.
-
-    Raises:
-        UnknownNameError: there is none.
-    """
-    if name not in FCI_VERSIONS:
-        raise UnknownNameError("Franka arm", name, FCI_VERSIONS)
-    return Arm.preset(name)
-
-
-@RobotConfig.register_subclass("er_il_franka")
-@dataclass(kw_only=True)
-class FrankaFollowerConfig(RobotConfig):
-    """A Franka arm with its hand.
-
-    Attributes:
-        address: Network address of its control box.
-        arm: ``fr3`` or ``panda``.
-        units: Of the joints' positions: ``deg``, as LeRobot's robots, or ``rad``. The gripper's opening is in [0, 1].
-        gripper: The arm has a Franka Hand.
-        speed: Share in (0, 1] of the joints' limits of velocity, acceleration and jerk.
-        collision_torque: External torque at a joint [Nm] that stops the arm.
-        collision_force: External force [N] or moment [Nm] at the end effector that stops the arm.
-        grasp_force: Force of the fingers on what they close around [N].
-        timeout: Seconds without an action after which the arm brakes, and holds.
-        cameras: LeRobot's cameras by name.
-    """
-
-    address: str
-    arm: str = "fr3"
-    units: str = "deg"
-    gripper: bool = True
-    speed: float = 0.2
-    collision_torque: float = 40.0
-    collision_force: float = 40.0
-    grasp_force: float = 20.0
-    timeout: float = 0.25
-    cameras: dict[str, CameraConfig] = field(default_factory=dict)
 
 
 class FrankaFollower(NeedsNoCalibration, Robot):
@@ -209,7 +168,8 @@ class FrankaFollower(NeedsNoCalibration, Robot):
         return self._arm
 
     def _answer(self, arm: FrankaArm) -> None:
-        failure = arm.end() or RobotError(f"The motion of the arm at {arm.address} has ended.")
+        with self._aiming:
+            failure = arm.end() or RobotError(f"The motion of the arm at {arm.address} has ended.")
         within_episode = not self._announcements.resetting and self._announcements.episode == self._episode
         if within_episode or not isinstance(failure, ReflexError):
             self.disconnect()

@@ -3,7 +3,8 @@
 import threading
 from typing import Any
 
-from er_il.robots.hardware.franka_arm import FrankaArm, in_words
+from er_il.robots.hardware.franka_arm import FrankaArm
+from er_il.robots.hardware.franka_library import in_words
 from er_il.support.errors import RobotError
 
 SPEED = 0.1  # [m/s] of the fingers

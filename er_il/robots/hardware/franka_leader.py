@@ -1,37 +1,18 @@
 """A Franka arm that a person guides, as a LeRobot teleoperator: ``--teleop.type=er_il_franka_leader``."""
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from lerobot.lerobot_types import RobotAction
-from lerobot.teleoperators import Teleoperator, TeleoperatorConfig
+from lerobot.teleoperators import Teleoperator
 from lerobot.utils.decorators import check_if_already_connected, check_if_not_connected
 
 from er_il.robots.hardware.calibration import NeedsNoCalibration
 from er_il.robots.hardware.franka_arm import FrankaArm
-from er_il.robots.hardware.franka_follower import franka_arm
+from er_il.robots.hardware.franka_config import FrankaLeaderConfig, franka_arm
 from er_il.robots.hardware.franka_hand import FrankaHand
 from er_il.robots.hardware.joints import JointNames
 from er_il.support.uncaught import tell_uncaught_in_one_line
-
-
-@TeleoperatorConfig.register_subclass("er_il_franka_leader")
-@dataclass(kw_only=True)
-class FrankaLeaderConfig(TeleoperatorConfig):
-    """A second Franka arm.
-
-    Attributes:
-        address: Network address of its control box.
-        arm: ``fr3`` or ``panda``: the follower's, whose joint names the actions carry.
-        units: Of the joints' positions: ``deg`` or ``rad``. The gripper's opening is in [0, 1].
-        gripper: The arm has a Franka Hand, whose opening the follower's hand mirrors.
-    """
-
-    address: str
-    arm: str = "fr3"
-    units: str = "deg"
-    gripper: bool = True
 
 
 class FrankaLeader(NeedsNoCalibration, Teleoperator):
@@ -75,9 +56,13 @@ class FrankaLeader(NeedsNoCalibration, Teleoperator):
             RobotError: one of them does not answer.
         """
         tell_uncaught_in_one_line()
-        self._arm = FrankaArm(self.config.address)
-        if self.config.gripper:
-            self._hand = FrankaHand(self._arm, force=0.0)
+        try:
+            self._arm = FrankaArm(self.config.address)
+            if self.config.gripper:
+                self._hand = FrankaHand(self._arm, force=0.0)
+        except BaseException:
+            self.disconnect()
+            raise
 
     @check_if_not_connected
     def get_action(self) -> RobotAction:
