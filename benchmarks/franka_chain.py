@@ -63,7 +63,7 @@ class Session:
         """
         print("+", shlex.join(command), flush=True)
         began = time.monotonic()
-        environment = os.environ | {"FRANKA_REALTIME": "ignore", "PYTHONUNBUFFERED": "1"}
+        environment = os.environ | {"PYTHONUNBUFFERED": "1"}
         process = subprocess.Popen(
             program(command), cwd=self.folder, env=environment, text=True,
             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
@@ -238,6 +238,7 @@ def main() -> None:
     parser.add_argument("--environment", type=Path, default=Path(tempfile.gettempdir()) / "franka-sim")
     parser.add_argument("--steps", type=int, default=400, help="of training")
     options = parser.parse_args()
+    os.environ["FRANKA_REALTIME"] = "ignore"  # the arms are simulated
     python = server_environment(options.environment)
     RESULTS.mkdir(parents=True, exist_ok=True)
     folder = Path(tempfile.mkdtemp(prefix="franka-chain-"))
@@ -252,16 +253,17 @@ def main() -> None:
         finally:
             looking.kill()
             looking.wait()
-    faults = fault_table(python, folder / "faults")
     pace = {arm.address: arm.pace() for arm in (follower, leader)}
-    whole = {
-        "meta": provenance() | {"slowest_physics_of_real_time": pace},
-        "commands": session.commands,
-        "chain": report,
-        "faults": faults,
-    }
+    whole: dict[str, Any] = {"meta": provenance() | {"slowest_physics_of_real_time": pace}}
+    whole |= {"commands": session.commands, "chain": report}
+    write(whole)
+    whole["faults"] = fault_table(python, folder / "faults")
+    write(whole)
+
+
+def write(whole: dict[str, Any]) -> None:
+    """Write the report."""
     (RESULTS / "report.json").write_text(json.dumps(whole, indent=2) + "\n")
-    print(json.dumps(whole, indent=2))
 
 
 if __name__ == "__main__":

@@ -4,7 +4,6 @@ Their server is strict here: like a real control box it stops a motion after 20 
 """
 
 import logging
-import os
 import signal
 import subprocess
 import sys
@@ -100,7 +99,7 @@ def command_fault(name: str, follower: SimulatedFranka, leader: SimulatedFranka)
     with log.open("w") as output:
         command = subprocess.Popen(
             [sys.executable, "-m", "lerobot.scripts.lerobot_teleoperate", *TELEOPERATE],
-            stdout=output, stderr=output, text=True, env=os.environ | {"FRANKA_REALTIME": "ignore"},
+            stdout=output, stderr=output, text=True,
         )  # fmt: skip
         until = time.monotonic() + STARTS_WITHIN
         while "Teleop loop time" not in log.read_text() and command.poll() is None and time.monotonic() < until:
