@@ -50,7 +50,7 @@ def in_words(address: str, ask: Callable[[], Any]) -> Any:
             said = f"There is no connection to {address} ({error}). A moving arm stops by itself. Check its power, its "
             said += "cable and that FCI is active in Desk."
         elif error.kind == "realtime":
-            said = f"{str(error).rstrip('.')}. Use a real-time kernel, or, for a simulated arm only, set FRANKA_REALTIME=ignore."
+            said = f"{str(error).rstrip('.')}. Use one that has; for a simulated arm, set FRANKA_REALTIME=ignore."
         else:
             said = f"The arm at {address} refuses ({error.kind}): {error}"
         raise RobotError(said) from error
