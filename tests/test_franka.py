@@ -1,6 +1,8 @@
 """Franka arms as LeRobot hardware: the driver against a fake of franka-rs, and er_il's own limits."""
 
+import json
 import logging
+import re
 import subprocess
 import sys
 import time
@@ -10,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from documented import ROOT
 from lerobot.robots import RobotConfig, make_robot_from_config
 from lerobot.teleoperators import TeleoperatorConfig, make_teleoperator_from_config
 from lerobot.utils.errors import DeviceNotConnectedError
@@ -342,6 +345,20 @@ def test_a_watchdog_calls_once_a_silence():
         time.sleep(silence)
     watchdog.end()
     assert len(calls) == 2
+
+
+def test_the_page_tells_what_was_measured():
+    report = json.loads((ROOT / "results" / "franka" / "report.json").read_text())
+    page = (ROOT / "docs" / "real_arm.md").read_text()
+    for command in ("teleoperate", "record", "rollout"):
+        row = next(line for line in page.splitlines() if line.startswith(f"| `lerobot-{command}`"))
+        measured = report["chain"][command]
+        names = ("period_p50_ms", "period_p99_ms", "work_p50_ms", "work_p99_ms")
+        assert re.findall(r"([\d.]+) ms", row) == [f"{measured[name]:.1f}" for name in names]
+    tracked = report["chain"]["teleoperate"]
+    assert f"lagged {tracked['lag_s']} s" in page and f"{1000 * tracked['largest_error_rad']:.1f} mrad" in page
+    assert not any(fault.get("traceback") for fault in report["faults"])
+    assert {fault["exit_code"] for fault in report["faults"] if "lost" in fault["fault"]} == {1, "runs on"}
 
 
 def test_an_error_that_nobody_catches_is_one_line():
