@@ -205,7 +205,8 @@ def test_an_action_that_is_not_finite_leaves_the_last_standing(
     q = FR3.home + 1e-5
     follower.send_action(action(q))
     for _ in range(3):
-        follower.send_action(action(np.where(np.arange(7) == 4, value, q + 0.5), opening=value))
+        sent = follower.send_action(action(np.where(np.arange(7) == 4, value, q + 0.5), opening=value))
+        np.testing.assert_allclose(list(sent.values()), [*np.degrees(q), 1.0])
         np.testing.assert_allclose(box.targets[-1], q)
     assert [record.message for record in caplog.records].count("Invalid action (not finite); the last one stands.") == 1
 

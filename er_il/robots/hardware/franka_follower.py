@@ -130,9 +130,7 @@ class FrankaFollower(NeedsNoCalibration, Robot):
         if self._watchdog is not None:
             self._watchdog.feed()
         if self._hand is not None:
-            if np.isfinite(wanted[-1]):
-                self._hand.aim(float(wanted[-1]))
-            target = np.append(target, wanted[-1])
+            target = np.append(target, self._hand.aim(float(wanted[-1])))
         return self._joints.to_robot(target)
 
     def disconnect(self) -> None:

@@ -1,5 +1,6 @@
 """The Franka Hand as a gripper with an opening that is asked for, and measured, without waiting for its motion."""
 
+import math
 import threading
 from typing import Any
 
@@ -51,10 +52,15 @@ class FrankaHand:
             raise self._failure
         return self._measured
 
-    def aim(self, opening: float) -> None:
-        """Move the fingers to an opening in [0, 1]; returns at once, and the latest opening counts."""
-        self._wanted = min(max(opening, 0.0), 1.0)
-        self._news.set()
+    def aim(self, opening: float) -> float:
+        """Move the fingers to an opening in [0, 1]; returns at once, with the opening that counts from now on.
+
+        It is the latest; one that is not finite leaves the last standing.
+        """
+        if math.isfinite(opening):
+            self._wanted = min(max(opening, 0.0), 1.0)
+            self._news.set()
+        return self._wanted
 
     def close(self) -> None:
         """End the connection; the fingers stay, and hold what they have grasped."""
