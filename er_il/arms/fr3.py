@@ -7,7 +7,7 @@ franka_description (version 0.1; later versions are wider by less than 0.01 rad)
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
-from er_il.arms.urdf import example_robot_data, generated_urdf, parse_urdf
+from er_il.arms.urdf import example_robot_data, generated_urdf, name_meshes_in, parse_urdf
 
 FROM, TO = "panda_", "fr3_"  # prefix of links and joints
 
@@ -41,6 +41,5 @@ def _fr3_xml(panda: ET.Element, packages: Path) -> str:
             assert limit is not None and soft is not None  # the Panda's revolute joints have both
             joint.remove(soft)
             limit.attrib.update(zip(("lower", "upper", "velocity"), map(str, limits), strict=True))
-    for mesh in panda.iter("mesh"):  # the file does not lie where the package's relative paths start
-        mesh.set("filename", mesh.get("filename", "").replace("package://", f"{packages}/"))
+    name_meshes_in(panda, packages)
     return ET.tostring(panda, encoding="unicode")
