@@ -15,6 +15,7 @@ import pytest
 from chains import write_chain
 from documented import PAGES, ROOT, Block, blocks, entry_point, run, train_in_process
 from foreign import write_bimanual, write_one_arm, write_openarm
+from lerobot.policies.act.configuration_act import ACTConfig
 
 import er_il.cli
 from er_il import Arm
@@ -44,10 +45,13 @@ SHOWN_ONLY = {"yaml", "text"}  # languages of blocks that hold no commands
 
 
 def prepare_real_arm(folder: Path) -> None:
-    panda, xarm = Arm.preset("panda"), Arm.preset("xarm7")
-    write_one_arm(folder / "demos/franka", panda, [f"{joint}.pos" for joint in panda.joints])
+    fr3, xarm = Arm.preset("fr3"), Arm.preset("xarm7")
+    write_one_arm(folder / "demos/franka", fr3, [f"{joint}.pos" for joint in fr3.joints], degrees=True)
     write_one_arm(folder / "demos/xarm", xarm, [f"joint{i}.pos" for i in range(1, 8)], degrees=True)
     write_openarm(folder)
+    # lerobot-rollout reads the policy's configuration as one of its arguments.
+    (folder / "policies/reach_erj_robot").mkdir(parents=True)
+    ACTConfig(device="cpu").save_pretrained(folder / "policies/reach_erj_robot")
 
 
 # What a reader of the page has already.

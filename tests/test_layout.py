@@ -159,7 +159,7 @@ def test_files_of_arms_that_cannot_be_read(tmp_path, text, message):
         (
             Wiring(arm="ur5"),
             UnknownNameError,
-            "Unknown arm 'ur5'. Valid: gen3, openarm_v1_left, .*, panda, panda8, xarm7, the path of a URDF",
+            "Unknown arm 'ur5'. Valid: fr3, gen3, openarm_v1_left, .*, panda, panda8, xarm7, the path of a URDF",
         ),
         (Wiring(arm="panda"), DatasetError, "Which dimensions are the joints of panda"),
         (Wiring(arm="panda", joints=("elbow",)), UnknownNameError, "Unknown dimension of the action 'elbow'. Valid: "),

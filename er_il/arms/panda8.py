@@ -8,7 +8,7 @@ import copy
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
-from er_il.arms.urdf import example_robot_data, generated_urdf, parse_urdf
+from er_il.arms.urdf import example_robot_data, generated_urdf, name_meshes_in, parse_urdf
 
 PREFIX = "panda_base_"  # of the new links and joints
 NEW = ("link1", "joint1", "link2", "joint2")
@@ -38,8 +38,7 @@ def _panda8_xml(panda: ET.Element, packages: Path) -> str:
     first.find("origin").attrib.update(elements["panda_joint3"].find("origin").attrib)  # pyright: ignore[reportOptionalMemberAccess]
     panda.set("name", "panda8")
     panda.extend(new.values())
-    for mesh in panda.iter("mesh"):  # the file does not lie where the package's relative paths start
-        mesh.set("filename", mesh.get("filename", "").replace("package://", f"{packages}/"))
+    name_meshes_in(panda, packages)
     return ET.tostring(panda, encoding="unicode")
 
 

@@ -6,6 +6,7 @@ from functools import partial
 from math import pi
 from pathlib import Path
 
+from er_il.arms.fr3 import fr3_urdf
 from er_il.arms.gen3 import gen3_urdf
 from er_il.arms.openarm import (
     SIDES,
@@ -45,6 +46,14 @@ PRESETS = {
         joints=PANDA_JOINTS,
         home=PANDA_HOME,
         weights=((0.7359, -0.0024, -0.4335, -0.0005, -0.3414, 0.003, 0.3923),),
+    ),
+    "fr3": Preset(
+        fr3_urdf,
+        base_frame="fr3_link0",
+        ee_frame="fr3_hand_tcp",
+        joints=tuple(f"fr3_joint{i}" for i in range(1, 8)),
+        home=PANDA_HOME,
+        weights=((0.7367, -0.0023, -0.4325, -0.0005, -0.3408, 0.003, 0.3924),),
     ),
     "panda8": Preset(
         panda8_urdf,

@@ -97,6 +97,12 @@ def find_mesh(name: str, urdf: Path) -> Path:
     raise ArmError(f"{urdf.name} names the mesh {name}, which is not to be found. Set ROS_PACKAGE_PATH to its package.")
 
 
+def name_meshes_in(robot: ET.Element, packages: Path) -> None:
+    """Let a robot's meshes name their files in a folder of packages: a generated URDF lies elsewhere."""
+    for mesh in robot.iter("mesh"):
+        mesh.set("filename", mesh.get("filename", "").replace(PACKAGE, f"{packages}/"))
+
+
 def generated_urdf(text: str, name: str) -> Path:
     """Path of a file with that text, in the folder for temporary files; written on first use."""
     folder = Path(tempfile.gettempdir()) / f"er_il-{hashlib.sha256(text.encode()).hexdigest()[:12]}"

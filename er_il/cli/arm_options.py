@@ -18,7 +18,7 @@ class ArmOptions:
     """The arm, and the dimensions that are its joints."""
 
     arm: str = ""
-    """Preset (panda, panda8, xarm7, gen3, openarm_v2_left, ...), or path of a URDF."""
+    """Preset (panda, panda8, fr3, xarm7, gen3, openarm_v2_left, ...), or path of a URDF."""
     ee_frame: str = ""
     """Link whose pose the actions command; a URDF needs it."""
     base_frame: str = ""

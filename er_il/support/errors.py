@@ -66,3 +66,11 @@ class PlanError(ErIlError):
 
 class RenderError(ErIlError):
     """The machine cannot render off screen."""
+
+
+class RobotError(ErIlError):
+    """A robot that cannot be reached, is not ready, or has stopped."""
+
+
+class ReflexError(RobotError):
+    """A robot that has stopped by itself to protect its surroundings, and can be recovered."""

@@ -1,4 +1,4 @@
-"""Calibration interface of LeRobot's devices, for simulated ones, which need none."""
+"""Calibration interface of LeRobot's devices, for those that need none: simulated and industrial arms."""
 
 
 class NeedsNoCalibration:
@@ -6,11 +6,11 @@ class NeedsNoCalibration:
 
     @property
     def is_calibrated(self) -> bool:
-        """True: a simulated device is always calibrated."""
+        """True: such a device is always calibrated."""
         return True
 
     def calibrate(self) -> None:
-        """Do nothing: a simulated joint needs no calibration."""
+        """Do nothing: its joints need no calibration."""
 
     def configure(self) -> None:
-        """Do nothing: a world is configured when it is made."""
+        """Do nothing: it is configured when it is made, or connected."""

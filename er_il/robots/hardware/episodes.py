@@ -2,7 +2,8 @@
 
 import logging
 
-ANNOUNCEMENT = "Recording episode"  # what lerobot-record and lerobot-rollout say aloud, and log
+# What lerobot-record and lerobot-rollout say aloud, and log.
+EPISODE, RESET = "Recording episode", "Reset the environment"
 
 
 class EpisodeAnnouncements(logging.Handler):
@@ -16,11 +17,13 @@ class EpisodeAnnouncements(logging.Handler):
     def __init__(self) -> None:
         super().__init__(logging.INFO)
         self.episode = 0  # of the session; as long as nothing is announced, the first
+        self.resetting = False  # between two episodes
         self._announced = 0
 
     def listen(self) -> None:
         """Start to listen, and to count from the first episode."""
         self.episode = self._announced = 0
+        self.resetting = False
         logging.getLogger().addHandler(self)
 
     def stop(self) -> None:
@@ -28,6 +31,9 @@ class EpisodeAnnouncements(logging.Handler):
         logging.getLogger().removeHandler(self)
 
     def emit(self, record: logging.LogRecord) -> None:
-        if record.getMessage().startswith(ANNOUNCEMENT):
+        said = record.getMessage()
+        if said.startswith(EPISODE):
             self.episode = self._announced
             self._announced += 1
+        if said.startswith((EPISODE, RESET)):
+            self.resetting = said.startswith(RESET)

@@ -14,24 +14,25 @@ GRIPPER = "gripper"
 
 
 class JointNames:
-    """Maps joint angles (n,) [rad] and a gripper's opening to ``{"<joint>.pos": ...}`` and back."""
+    """Maps joint angles (n,) [rad] and a gripper's opening, if there is one, to ``{"<joint>.pos": ...}`` and back."""
 
-    def __init__(self, joints: Sequence[str], units: str) -> None:
+    def __init__(self, joints: Sequence[str], units: str, gripper: bool = True) -> None:
         """Map ``joints``, spoken of in ``units``; the gripper's opening stays in [0, 1].
 
         Raises:
             UnknownNameError: the units are neither ``deg`` nor ``rad``.
         """
         self._motors = Motors(tuple(f"{joint}{POSITION}" for joint in joints), units)
-        self.names = (*self._motors.joints, f"{GRIPPER}{POSITION}")
+        self.names = (*self._motors.joints, *([f"{GRIPPER}{POSITION}"] if gripper else []))
 
     def to_robot(self, values: Vector) -> dict[str, float]:
-        """Name (n + 1,) angles [rad] and opening, in the robot's units."""
-        spoken = [*self._motors.values(values[:-1]).tolist(), float(values[-1])]
+        """Name angles (n,) [rad] and the opening, one vector, in the robot's units."""
+        n = len(self._motors.joints)
+        spoken = [*self._motors.values(values[:n]).tolist(), *values[n:].tolist()]
         return dict(zip(self.names, spoken, strict=True))
 
     def from_robot(self, named: Mapping[str, Any]) -> Vector:
-        """Return (n + 1,) angles [rad] and opening. Other names are ignored.
+        """Return angles (n,) [rad] and the opening as one vector. Other names are ignored.
 
         Raises:
             ErIlError: a joint is missing.
@@ -41,9 +42,10 @@ class JointNames:
         wanted = [name.removesuffix(POSITION) for name in self.names]
         if missing := [name for name in wanted if name not in values]:
             raise ErIlError(
-                f"The action lacks {', '.join(missing)}; it has {', '.join(named)}. The simulated robot takes "
+                f"The action lacks {', '.join(missing)}; it has {', '.join(named)}. The robot takes "
                 f"{', '.join(self.names)}; an ERJ, ERA or task action must be decoded before: by "
                 "--robot.type=er_il_arm around this robot, or er-il attach."
             )
         spoken = np.array([float(values[name]) for name in wanted])
-        return np.append(self._motors.angles(spoken[:-1]), spoken[-1])
+        n = len(self._motors.joints)
+        return np.append(self._motors.angles(spoken[:n]), spoken[n:])
