@@ -21,7 +21,7 @@ HOLD = 0.5  # [s] for which it presses
 
 
 class BimanualPressLeader(BimanualLeader[BimanualPress]):
-    """Lets both elbows down while the hands come forward, then pushes both buttons."""
+    """Brings the hands forward, lets both elbows down before the guards, then pushes both buttons."""
 
     def _script(self, rng: np.random.Generator) -> tuple[Sequence[Segment], float]:
         world, checks = self._world, self._collisions()
