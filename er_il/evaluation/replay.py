@@ -161,8 +161,8 @@ class _Play:
 
 
 def _plays(dataset: Path) -> list[_Play]:
-    recipe = DatasetRecord.read(dataset).recipe
     first = Dataset(dataset).layout.parts[0]  # refuses what this version would decode differently
+    recipe = DatasetRecord.read(dataset).recipe
     name = name_of(first.space, robot_arms(recipe.arm)[first.label])
     rotation = first.space.spec().get("rotation", Quaternion.kind)
     readers = [key for key, each in DECODERS.items() if each.space == name] or [name]
