@@ -110,9 +110,7 @@ def test_the_drivers_limits_lie_within_the_presets(side: str, limits: dict[str, 
 
 
 def test_a_file_of_arms_that_is_neither_there_nor_shipped() -> None:
-    with pytest.raises(
-        DatasetError, match=r"no file of arms openarm_v3\. Shipped: openarm_v1, openarm_v2\.$"
-    ):
+    with pytest.raises(DatasetError, match=r"no file of arms openarm_v3\. Shipped: openarm_v1, openarm_v2\.$"):
         read_wirings(Path("openarm_v3"))
 
 

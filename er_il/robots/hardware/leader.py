@@ -11,7 +11,7 @@ from lerobot.teleoperators import Teleoperator, TeleoperatorConfig
 from lerobot.utils.decorators import check_if_already_connected, check_if_not_connected
 
 from er_il.arms.arm import Vector
-from er_il.envs.protocol import demonstrable_env
+from er_il.envs.protocol import arm_env, demonstrable_env
 from er_il.envs.tasks import task_id
 from er_il.robots.hardware.calibration import NeedsNoCalibration
 from er_il.robots.hardware.episodes import EpisodeAnnouncements
@@ -58,7 +58,7 @@ class ScriptedLeader(NeedsNoCalibration, Teleoperator):
             task_id(config.task), max_episode_steps=-1, disable_env_checker=True, arm=config.arm
         )
         self._world = demonstrable_env(self._env)
-        self._joints = JointNames(self._world.arm.joints, config.units)
+        self._joints = JointNames(arm_env(self._env).arm.joints, config.units)
         self._announcements = EpisodeAnnouncements()
         self._script: Iterator[Vector] | None = None
         self._last: Vector = np.zeros(len(self._joints.names))
