@@ -163,8 +163,8 @@ class _Play:
 
 
 def _plays(dataset: Path) -> list[_Play]:
-    recipe = DatasetRecord.read(dataset).recipe
     first = Dataset(dataset).layout.parts[0]  # refuses what this version would decode differently
+    recipe = DatasetRecord.read(dataset).recipe
     name = name_of(first.space, robot_arms(recipe.arm)[first.label])
     rotation = first.space.spec().get("rotation", Quaternion.kind)
     with closing(gymnasium.make(task_id(recipe.task), **recipe.replaced(cameras=()).environment)) as env:

@@ -2,7 +2,7 @@
 
 The operator's arms start between two tables, drawn back, the elbows out above them: let down, they sink onto the
 tables. Before the buttons stand the press's two guards, between which the forearms fit only with the elbows down: held
-out, they strike them. So both elbows must come down while the hands go forward, and the hands' poses say nothing of
+out, they strike them. So both elbows must come down once the hands are forward, and the hands' poses say nothing of
 that. No constant posture of the elbows does both.
 """
 

@@ -18,10 +18,10 @@ class Press:
     depth: float = 0.25
     width: float = 0.80
     top: float = 0.12  # z of the console's top
-    guards: tuple[float, float] = (0.20, 0.28)  # x of the two guards, upright plates
+    guards: tuple[float, float] = (0.24, 0.32)  # x of the two guards, upright plates
     gap: float = 0.43  # between them
     guard_top: float = 0.16
-    tables: tuple[float, float] = (-0.30, -0.02)  # x of the two tables
+    tables: tuple[float, float] = (-0.30, 0.03)  # x of the two tables
     aisle: float = 0.20  # between them
     table_width: float = 0.34
     table_top: float = -0.18
