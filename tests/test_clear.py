@@ -159,7 +159,7 @@ def test_where_it_cannot_work_it_says_so(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.delattr(ArmTask, "clearances")
     world = gymnasium.make(task_id("lift_cup"))
     with pytest.raises(ErIlError, match=r"LiftCup-v0 is no environment for task-clear, .*: it lacks clearances\.$"):
-        DECODERS["task-clear"].space_in(world)
+        DECODERS["task-clear"].layout_in(world)
     assert DECODERS["task-nearest"].works_in(world) and not DECODERS["task-clear"].works_in(world)
 
 

@@ -28,7 +28,7 @@ def test_generate_takes_the_recipe_and_what_is_given_instead(monkeypatch, tmp_pa
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["sweep"], "Unknown task 'sweep'. Valid: lift_cup, "),
+        (["sweep"], "Unknown task 'sweep'. Valid: bimanual_press, lift_cup, "),
         (["reach_cup", "--spaces", "polar"], "Unknown action space 'polar'. Valid: joint, task, erj"),
         (["reach_cup", "--cameras", "elbow"], "Unknown camera 'elbow'. Valid: "),
         (["reach_cup", "--episodes", "0"], "episodes is 0: Input should be greater than or equal to 1"),

@@ -323,7 +323,7 @@ def test_mistakes(datasets: Path, tmp_path: Path):
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (["train", "reach_cap", "erj"], "Unknown task 'reach_cap'. Valid: lift_cup, "),
+        (["train", "reach_cap", "erj"], "Unknown task 'reach_cap'. Valid: bimanual_press, lift_cup, "),
         (["train", "reach_cup", "ejr"], "Unknown action space 'ejr'."),
         (["train", "reach_cup", "erj", "--dataset", "nowhere"], "nowhere is not a LeRobot v3 dataset"),
         (["eval", "nowhere", "--task", "reach_cup", "--decoder", "erj"], "No policy at nowhere"),
