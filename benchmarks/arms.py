@@ -2,8 +2,8 @@
 
 All but the presets come as a URDF file and the names in it that a user would give; the rest is found.
 
-The numbers: KUKA LBR iiwa 14 R820 and Franka Research 3 as modified Denavit-Hartenberg parameters with the ranges and
-speeds of their data sheets; Rethink Sawyer as the joint frames of its maker's description (`sawyer_description`).
+The numbers: KUKA LBR iiwa 14 R820 as modified Denavit-Hartenberg parameters with the ranges and speeds of its data
+sheet; Rethink Sawyer as the joint frames of its maker's description (`sawyer_description`).
 """
 
 from collections.abc import Callable
@@ -43,16 +43,6 @@ def iiwa14() -> Arm:
     return _arm("iiwa14", joints, Tool("flange", (0.0, 0.0, 0.126)))
 
 
-def fr3() -> Arm:
-    """Franka Research 3 with Franka's hand."""
-    rows = [(0, 0, 0.333), (0, -pi / 2, 0), (0, pi / 2, 0.316), (0.0825, pi / 2, 0)]
-    rows += [(-0.0825, -pi / 2, 0.384), (0, pi / 2, 0), (0.088, pi / 2, 0)]
-    ranges = [(-2.7437, 2.7437), (-1.7837, 1.7837), (-2.9007, 2.9007), (-3.0421, -0.1518)]
-    ranges += [(-2.8065, 2.8065), (0.5445, 4.5169), (-3.0159, 3.0159)]
-    joints = _joints(_origins(rows), ranges, [2.62, 2.62, 2.62, 2.62, 5.26, 4.18, 5.26])
-    return _arm("fr3", joints, Tool("hand_tcp", (0.0, 0.0, 0.107 + 0.1034), (0.0, 0.0, -pi / 4)))
-
-
 def sawyer() -> Arm:
     """Rethink Robotics' Sawyer."""
     origins: list[tuple[Triple, Triple]] = [
@@ -80,7 +70,7 @@ def _named(name: str, file: str, tip: str, base: str | None = None) -> tuple[str
 
 REDUNDANT: dict[str, Callable[[], Arm]] = {
     **{name: partial(Arm.preset, name) for name in PRESETS},
-    **{arm.__name__: arm for arm in (iiwa14, fr3, sawyer)},
+    **{arm.__name__: arm for arm in (iiwa14, sawyer)},
     **dict(
         (
             _named("baxter", "baxter_description/urdf/baxter.urdf", "left_gripper", "left_arm_mount"),
