@@ -1,4 +1,7 @@
-"""LeRobot finds plugins by distribution name; importing this module registers er_il's, and checks the command."""
+"""LeRobot finds plugins by distribution name; importing this module registers er_il's, and checks the command.
+
+Mistakes that er_il finds end LeRobot's commands with one line, too.
+"""
 
 import sys
 
@@ -6,5 +9,7 @@ import er_il.envs.lerobot_plugin  # --env.type=er_il
 import er_il.robots.hardware  # --robot.type=er_il_arm, er_il_sim; --teleop.type=er_il_scripted_leader
 import er_il.robots.processors  # noqa: F401  the decoding steps of policies and pipelines
 from er_il.robots.guard import check_command
+from er_il.support.uncaught import tell_uncaught_in_one_line
 
+tell_uncaught_in_one_line()
 check_command(sys.argv[1:])

@@ -369,5 +369,8 @@ def test_an_error_that_nobody_catches_is_one_line():
     )
     told = subprocess.run([sys.executable, "-c", code.format("RobotError")], capture_output=True, text=True)
     assert (told.returncode, told.stderr) == (1, "error: Lost the arm.\n")
+    wrapped = code.format("ValueError").removesuffix("\n") + " from RobotError('No such arm.')"  # as LeRobot does
+    told = subprocess.run([sys.executable, "-c", wrapped], capture_output=True, text=True)
+    assert (told.returncode, told.stderr) == (1, "error: No such arm.\n")
     bug = subprocess.run([sys.executable, "-c", code.format("KeyError")], capture_output=True, text=True)
     assert bug.returncode == 1 and "Traceback" in bug.stderr

@@ -8,7 +8,7 @@ from er_il.support.failures import explanation
 
 
 def tell_uncaught_in_one_line() -> None:
-    """Let an :class:`ErIlError` end this program with one line instead of a traceback; other errors as before."""
+    """Let an :class:`ErIlError`, or what was raised from one, end this program with one line instead of a traceback."""
     if sys.excepthook is not _tell:
         global _before
         _before, sys.excepthook = sys.excepthook, _tell
@@ -18,7 +18,10 @@ _before = sys.excepthook
 
 
 def _tell(kind: type[BaseException], error: BaseException, at: TracebackType | None) -> None:
-    if isinstance(error, ErIlError):
-        print(f"error: {explanation(error)}", file=sys.stderr)
-    else:
+    cause: BaseException | None = error
+    while cause is not None and not isinstance(cause, ErIlError):
+        cause = cause.__cause__
+    if cause is None:
         _before(kind, error, at)
+    else:
+        print(f"error: {explanation(cause)}", file=sys.stderr)

@@ -22,7 +22,6 @@ from er_il.robots.hardware.joint_guard import JointGuard
 from er_il.robots.hardware.joints import JointNames
 from er_il.robots.hardware.watchdog import Watchdog
 from er_il.support.errors import NumbersError, ReflexError, RobotError
-from er_il.support.uncaught import tell_uncaught_in_one_line
 
 logger = logging.getLogger(__name__)
 
@@ -89,7 +88,6 @@ class FrankaFollower(NeedsNoCalibration, Robot):
         Raises:
             RobotError: one of them is not ready.
         """
-        tell_uncaught_in_one_line()
         try:
             self._arm = FrankaArm(self.config.address)
             self._arm.check_kind(self.config.arm)

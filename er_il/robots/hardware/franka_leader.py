@@ -12,7 +12,6 @@ from er_il.robots.hardware.franka_arm import FrankaArm
 from er_il.robots.hardware.franka_config import FrankaLeaderConfig, franka_arm
 from er_il.robots.hardware.franka_hand import FrankaHand
 from er_il.robots.hardware.joints import JointNames
-from er_il.support.uncaught import tell_uncaught_in_one_line
 
 
 class FrankaLeader(NeedsNoCalibration, Teleoperator):
@@ -55,7 +54,6 @@ class FrankaLeader(NeedsNoCalibration, Teleoperator):
         Raises:
             RobotError: one of them does not answer.
         """
-        tell_uncaught_in_one_line()
         try:
             self._arm = FrankaArm(self.config.address)
             if self.config.gripper:
