@@ -35,9 +35,12 @@ def notes(report: Report) -> list[str]:
 
 
 def margins_texts(report: Report) -> pd.DataFrame:
-    """Texts of the study's table, a row per space."""
+    """Texts of the study's table, a row per space, the one first that stays farthest from its folds everywhere."""
     sets = by_demos(report)
-    return table("margins", sets=sets, spaces=list(next(iter(sets.values()))))
+    smallest = {
+        space: min(of_set[space]["smallest"] for of_set in sets.values()) for space in next(iter(sets.values()))
+    }
+    return table("margins", sets=sets, spaces=sorted(smallest, key=smallest.__getitem__, reverse=True))
 
 
 def margins_table(report: Report) -> str:
