@@ -27,7 +27,7 @@ from er_il.kinematics.linear_coordinates import SPEC_KEY
 from er_il.kinematics.rotation import Quaternion
 from er_il.spaces.base import ArmSpace
 from er_il.spaces.layout import Layout
-from er_il.spaces.registry import AT, ERX, weights_text
+from er_il.spaces.registry import AND, AT, ERX, weights_text
 from er_il.spaces.spec import action_spec
 from er_il.support.declaration import check_values
 from er_il.support.errors import DatasetError, PolicyError
@@ -35,7 +35,6 @@ from er_il.support.json_files import read_json
 
 PREFIX = "er_il:"
 NONE = "-"
-PLUS = "+"
 
 # Name of the post-processing step that `er-il attach` gives a policy, to decode for a robot by itself.
 DECODE_POLICY_ACTION = "er_il_decode_policy_action"
@@ -62,7 +61,7 @@ class Contract:
         # What a space commands beside the pose is the arm's redundant joints only if it names them.
         names = {name.rpartition(".")[0] for name in spec["names"]}  # joint.pos, or joint.delta
         commanded = [joint for joint in arm["redundant"] if joint in names]
-        redundant = PLUS.join(commanded) if "rotation" in spec and commanded else NONE
+        redundant = AND.join(commanded) if "rotation" in spec and commanded else NONE
         return cls(spec["space"], arm["name"], arm["ee_frame"], rotation, redundant)
 
     @classmethod
@@ -70,8 +69,8 @@ class Contract:
         """The contract of several arms, which have an action space of one kind."""
         each = [cls.of_spec(arm) for arm in arms]
         name = robot_name({arm["label"]: one.arm for arm, one in zip(arms, each, strict=True)})
-        redundant = PLUS.join(one.redundant for one in each if one.redundant != NONE)
-        return cls(each[0].space, name, PLUS.join(one.frame for one in each), each[0].rotation, redundant or NONE)
+        redundant = AND.join(one.redundant for one in each if one.redundant != NONE)
+        return cls(each[0].space, name, AND.join(one.frame for one in each), each[0].rotation, redundant or NONE)
 
     @classmethod
     def of_space(cls, space: ArmSpace | Layout) -> "Contract":

@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from er_il.arms.arm import Arm, Vector
 from er_il.control.commander import Commander
 from er_il.experiments.studies import Advance, Demos
+from er_il.kinematics.self_motion import self_motions
 from er_il.kinematics.solver import Kinematics
 from er_il.spaces.base import Array
 from er_il.spaces.pose import PoseSpace
@@ -52,7 +53,7 @@ def study_elbow_angle(arm: Arm, demos: Demos, workers: int, advance: Advance) ->
 
 def elbow_speed(kinematics: Kinematics, elbow: str, q: Array) -> Vector:
     """How far (N,) [m/rad] a link moves per radian of self-motion at q (N, n) [rad], n = 7."""
-    self_motion = np.linalg.svd(kinematics.jacobians(q))[2][:, -1]  # (N, n) unit
+    (self_motion,) = self_motions(kinematics.arm, q).transpose(1, 0, 2)  # (N, n) unit
     jacobian = kinematics.chain.walk(q).jacobian(kinematics.mounted(elbow))[:3]  # (3, n, N)
     return np.linalg.norm(np.einsum("inN,Nn->Ni", jacobian, self_motion), axis=1)
 
