@@ -33,7 +33,7 @@ OWNER = "benchmark.json"
 
 @dataclass(frozen=True)
 class Plan:
-    """A grid's jobs, with their results in a folder that belongs to one grid."""
+    """A grid's jobs, with their results in a folder, which other grids may share: what they have in common is done once."""
 
     grid: Grid
     out: Path
@@ -41,7 +41,7 @@ class Plan:
 
     @contextmanager
     def claimed(self) -> Iterator[None]:
-        """Make the folder this grid's own, and work in it alone.
+        """Make the folder one of experiments, and work in it alone.
 
         Raises:
             ErIlError: another command works in it, or :meth:`check` refuses it.
@@ -53,7 +53,7 @@ class Plan:
             yield
 
     def check(self) -> dict[str, Any]:
-        """Check that the folder is this grid's own or can become it; return what it is to say of its owner.
+        """Check that this grid can work in the folder; return what the folder is to say of its policies.
 
         Raises:
             ErIlError: it holds something else, demonstrations of another recipe than today's, or policies trained by
@@ -73,18 +73,16 @@ class Plan:
                     f"Choose another --out, or delete what {self.out} holds of {cell.task}."
                 )
         mine = {name: read_config(default_config(name, grid.configuration)) for name in grid.spaces}
-        owned = read_json(owner, ErIlError) if owner.exists() else {"title": grid.title, "configurations": {}}
-        if not isinstance(owned.get("configurations"), dict) or "title" not in owned:
-            raise ErIlError(f"{owner} is damaged: it does not say which grid the folder belongs to.")
-        if owned["title"] != grid.title:
-            raise ErIlError(f"{self.out} belongs to the grid {owned['title']!r}; choose another --out.")
-        theirs = owned["configurations"]
+        owned = read_json(owner, ErIlError) if owner.exists() else {"configurations": {}}
+        theirs = owned.get("configurations")
+        if not isinstance(theirs, dict):
+            raise ErIlError(f"{owner} is damaged: it does not say how the folder's policies were trained.")
         if changed := [name for name in mine if name in theirs and mine[name] != theirs[name]]:
             raise ErIlError(
                 f"{self.out} holds policies trained by other configurations than today's, of "
                 f"{', '.join(changed)}; choose another --out, or delete it."
             )
-        return {"title": grid.title, "configurations": theirs | mine}
+        return {"configurations": theirs | mine}
 
     @cached_property
     def _demonstrations(self) -> dict[str, Demonstrate]:
