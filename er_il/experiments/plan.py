@@ -33,7 +33,7 @@ OWNER = "benchmark.json"
 
 @dataclass(frozen=True)
 class Plan:
-    """A grid's jobs, with their results in a folder, which other grids may share: what they have in common is done once."""
+    """A grid's jobs, with their results in a folder. Other grids may share it: what is common is done once."""
 
     grid: Grid
     out: Path
