@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 from er_il.support.atomic_files import write_atomically
 
 INK, GREY, GRID = "#222222", "#767676", "#dddddd"
+WINE = "#882255"  # Paul Tol's
 GOOD, BAD = "#2e7d32", "#b3261e"
 # Okabe and Ito's palette, which colour-blind readers can tell apart.
 SKY, GREEN, PURPLE, ORANGE, RED, YELLOW, BLUE = (
@@ -43,7 +44,7 @@ LOOKS = {
     "erx": Look("ERX", BLUE),
     "task-nearest": Look("Task (nearest)", ORANGE),
     "task-posture": Look("Task (posture)", RED),
-    "task-clear": Look("Task (clear)", BLUE),
+    "task-clear": Look("Task (clear)", WINE),
     "task-mean": Look("Task (mean posture)", YELLOW),
     "task-grasp": Look("Task (grasp posture)", GREY),
 }
