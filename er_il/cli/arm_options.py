@@ -23,6 +23,12 @@ class ArmOptions:
     """Link whose pose the actions command; a URDF needs it."""
     base_frame: str = ""
     """Link in which poses are expressed; the URDF's root if omitted."""
+    from_: Annotated[Names, arg(name="from")] = ()
+    """Columns that hold the joints, if action does not: COLUMN, or COLUMN:NAME,NAME for some of its dimensions, either
+    also after DATASET: for another dataset of the same frames. What observation* and state* measured commands the frame
+    before."""
+    state_from: Names = ()
+    """Columns of the measured joints, likewise, if observation.state does not have them: it becomes what they hold."""
     joints: Names = ()
     """Dimensions of the action that are the arm's joints, base first; found by the arm's joint names if omitted.
     All other dimensions, such as the gripper, are passed through."""
@@ -60,11 +66,20 @@ class ArmOptions:
         if self.arms is not None and self.arm:
             raise DatasetError("Give either --arm or --arms.")
         if self.arms is not None:
-            return read_wirings(self.arms)
+            return [self._in_columns(each) for each in read_wirings(self.arms)]
         if not self.arm:
+            if self.from_ or self.state_from:
+                raise DatasetError("--from and --state-from say where an arm's joints are: give --arm or --arms, too.")
             return []
         if self.arm in ROBOTS:
             raise DatasetError(f"{self.arm} has several arms: give --arms {self.arm}.")
         wiring = self.wiring(redundant, angle_frames)
         wiring.build_arm()
         return [wiring]
+
+    def _in_columns(self, wiring: "Wiring") -> "Wiring":
+        """An arm of a file, in the columns of the options where the file names none."""
+        return wiring.replaced(
+            from_=wiring.from_ or self.from_,
+            state_from=wiring.state_from or self.state_from,
+        )

@@ -34,7 +34,7 @@ def encode(
         angle_frames: Shoulder, elbow and wrist link, for era; those at which seven joints bend if omitted.
         rotation: quat or rot6d.
         weights: File of the weights of erx, which er-il advise --fit erx writes; those of the arm if omitted.
-        keep: Keep the actions as they were in a column source.action, which no policy reads.
+        keep: Keep the actions as they were, and other columns of actions, in columns source.*, which no policy reads.
     """
     from rich.console import Console
 
@@ -59,6 +59,8 @@ def encode(
         )
     names = written.layout.encoded_names
     console.print(f"{out}: {len(names)} dimensions: {', '.join(names)}", highlight=False, soft_wrap=True)
+    for note in written.notes:
+        console.print(note, highlight=False, soft_wrap=True, markup=False)
     if written.statuses:
         listed = ", ".join(f"{status} {count}" for status, count in written.statuses.most_common())
         console.print(f"Decoded commands by status: {listed}", highlight=False)

@@ -1,7 +1,7 @@
 """Provenance of a re-encoded dataset: ``meta/er_il.json`` for programs, a section of its card for people."""
 
-import json
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,15 +9,14 @@ from lerobot.datasets import create_lerobot_dataset_card
 from lerobot.datasets.io_utils import load_info
 
 from er_il.datasets.dataset import Dataset
+from er_il.datasets.history import append_to_history
 from er_il.kinematics.linear_coordinates import LinearCoordinates
 from er_il.spaces.delta import DeltaSpace
 from er_il.spaces.joint import JOINT
 from er_il.spaces.layout import Layout, Part
 from er_il.spaces.pose import PoseSpace
-from er_il.support.errors import DatasetError
 from er_il.support.provenance import provenance
 
-HISTORY = Path("meta/er_il.json")
 CARD = Path("README.md")
 
 _MEANINGS = {  # of an arm's commands, by name
@@ -33,41 +32,28 @@ _MEANINGS = {  # of an arm's commands, by name
 _START, _END = "<!-- er_il: start -->", "<!-- er_il: end -->"
 
 
-def sign(dataset: Dataset, source: str, options: dict[str, Any]) -> None:
+def sign(dataset: Dataset, source: str, options: dict[str, Any], notes: Sequence[str] = ()) -> None:
     """Write where a dataset comes from and what its actions mean into its metadata and card.
 
     Args:
         dataset: The dataset; it says what its actions mean.
         source: The dataset it was made from, its name or repository id.
         options: What else was asked for, as JSON.
+        notes: What else its user should know of the actions, a sentence or more each.
+
+    Raises:
+        DatasetError: what was written before is damaged.
     """
-    path, history = dataset.root / HISTORY, read_history(dataset.root)
     made = {key: value for key, value in provenance().items() if key != "machine"}
-    path.write_text(json.dumps([*history, {"source": source, **options, **made}], indent=2))
+    append_to_history(dataset.root, {"source": source, **options, **made})
     card = dataset.root / CARD
     info = load_info(dataset.root)
     text = card.read_text() if card.exists() else str(create_lerobot_dataset_card(dataset_info=info))
     text = re.sub(f"\n*{_START}.*{_END}\n*", "\n", text, flags=re.DOTALL)
-    card.write_text(f"{text.rstrip()}\n\n{_START}\n{_section(dataset.layout, source)}\n{_END}\n")
+    card.write_text(f"{text.rstrip()}\n\n{_START}\n{_section(dataset.layout, source, notes)}\n{_END}\n")
 
 
-def read_history(root: Path) -> list[Any]:
-    """Read what a dataset's re-encodings have written down so far; empty if it is none.
-
-    Raises:
-        DatasetError: the file is damaged.
-    """
-    path = root / HISTORY
-    try:
-        history = json.loads(path.read_text()) if path.exists() else []
-    except (ValueError, RecursionError) as error:
-        raise DatasetError(f"{path} is damaged, not valid JSON.") from error
-    if not isinstance(history, list):
-        raise DatasetError(f"{path} is damaged: it holds no list.")
-    return history
-
-
-def _section(layout: Layout, source: str) -> str:
+def _section(layout: Layout, source: str, notes: Sequence[str]) -> str:
     rows = [
         f"| {index} | `{name}` | {dimension_meaning(layout, name)} |" for index, name in enumerate(layout.encoded_names)
     ]
@@ -85,6 +71,7 @@ def _section(layout: Layout, source: str) -> str:
             "exactly is in `meta/info.json` under `features.action.info.er_il`; `meta/er_il.json` says where they come",
             "from.",
             "",
+            *(line for note in notes for line in (note, "")),
             *arms,
             "",
             "| | Dimension | Meaning |",

@@ -1,6 +1,7 @@
 """A LeRobot v3 dataset on disk: metadata, columns and episodes, read without LeRobot, whose import takes seconds."""
 
 import math
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,8 +12,9 @@ import numpy as np
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from er_il.datasets.history import recorded_spec
 from er_il.datasets.metadata import DatasetInfo
-from er_il.datasets.schema import LEADER_JOINTS, SOURCE_ACTION, STATE, Feature, dimension_names
+from er_il.datasets.schema import LEADER_JOINTS, SOURCE_ACTION, SOURCE_JOINTS, STATE, Feature, dimension_names
 from er_il.datasets.tables import column_of, episode_slices, parquet_files, read_table, reading
 from er_il.spaces.joint import JOINT
 from er_il.spaces.layout import Layout
@@ -47,12 +49,11 @@ class Dataset:
         version = str(info.get("codebase_version"))
         if "codebase_version" in info and not version.startswith(VERSION):
             raise DatasetError(
-                f"{self.root} is a LeRobot dataset of version {version}, not v3.0. Convert it first: "
-                "python -m lerobot.scripts.convert_dataset_v21_to_v30."
+                f"{self.root} is a LeRobot dataset of version {version}, not v3.0. {conversion(version, self.root)}"
             )
         check_values(DatasetInfo, info, self.root / INFO, DatasetError)
         features = {name: each | {"shape": tuple(each["shape"])} for name, each in info["features"].items()}
-        if not info["total_frames"] or not info["total_episodes"] or ACTION not in features:
+        if not info["total_frames"] or not info["total_episodes"]:
             raise DatasetError(f"{self.root} holds no actions.")
         return info | {"features": features}
 
@@ -74,7 +75,15 @@ class Dataset:
     @property
     def specified(self) -> bool:
         """True if the dataset says what its actions mean."""
-        return SPEC in (self.features[ACTION].get("info") or {})
+        return self._said is not None
+
+    @cached_property
+    def _said(self) -> Any:
+        """What the feature says; if nothing, the record, as of joints that were restored to what they had been."""
+        if ACTION not in self.features:
+            return None
+        info = self.features[ACTION].get("info") or {}
+        return info[SPEC] if SPEC in info else recorded_spec(self.root)
 
     @property
     def spec(self) -> dict[str, Any]:
@@ -84,12 +93,14 @@ class Dataset:
             DatasetError: there is none.
             SpecError: it is damaged.
         """
+        if ACTION not in self.features:
+            raise DatasetError(f"{self.root} holds no actions.")
         if not self.specified:
             raise DatasetError(
                 "The dataset does not say what its actions mean. Write it again so that it does, as it is or in "
                 "another space: er-il encode DATASET --to joint --arm panda --out OUT."
             )
-        spec = self.features[ACTION]["info"][SPEC]
+        spec = self._said
         if not isinstance(spec, dict) or not isinstance(spec.get("space"), str):
             raise SpecError(f"{self.root / INFO} is damaged: its action spec names no action space.")
         return spec
@@ -171,7 +182,7 @@ class Dataset:
 
     def joints_column(self, layout: Layout) -> str | None:
         """Name of the column that holds the joint vectors of a layout as they were recorded, if there is one."""
-        for column in (LEADER_JOINTS, SOURCE_ACTION, ACTION):
+        for column in (LEADER_JOINTS, SOURCE_JOINTS, SOURCE_ACTION, ACTION):
             encoded = column == ACTION and self.specified and self.spec["space"] != JOINT
             if self.names(column) == layout.names and not encoded:
                 return column
@@ -187,6 +198,20 @@ class Dataset:
         for part in layout.parts:
             measured[:, layout.indices(part)] = state[:, [names.index(name) for name in part.motors.state]]
         return measured
+
+
+def conversion(version: str, root: Path, repository: str = "") -> str:
+    """How to convert a dataset of an older format: LeRobot's own command, and it keeps the hub as it is.
+
+    Args:
+        version: Of its format.
+        root: Its folder; the converter replaces it, and leaves the old one beside it.
+        repository: Its id on the hub, from where the converter downloads it if the folder is not there.
+    """
+    first = "" if version == "v2.1" else "with an older LeRobot to v2.1, then "
+    name = repository or f"local/{root.resolve().name}"
+    options = f"--repo-id={name} --root={shlex.quote(str(root))} --push-to-hub=false"
+    return f"Convert it: {first}python -m lerobot.scripts.convert_dataset_v21_to_v30 {options}"
 
 
 def datasets_in(folder: Path) -> list[Path]:

@@ -8,9 +8,15 @@ import numpy as np
 from er_il.datasets.dataset import Dataset, Floats
 from er_il.datasets.decoding import DecodedEpisode, decode_episodes, read_encoded_episodes
 from er_il.datasets.normalisation import bound_rotation_deviation
-from er_il.datasets.rewriting import Advance, Column, Copy, rewrite
-from er_il.datasets.schema import LEADER_JOINTS, SOURCE_ACTION, Feature, action_feature
-from er_il.spaces.joint import JOINT
+from er_il.datasets.rewriting import Advance, Column, rewrite
+from er_il.datasets.schema import LEADER_JOINTS, SOURCE_ACTION, action_feature
+from er_il.datasets.source_columns import (
+    RECORDED,
+    SourceColumns,
+    columns_to_keep,
+    columns_to_restore,
+    recorded_action,
+)
 from er_il.spaces.layout import Layout
 from er_il.spaces.spec import ACTION
 from er_il.support.atomic_files import atomic_folder
@@ -40,7 +46,7 @@ def encode_dataset(
         target: Folder that does not exist.
         layout: What the joint vectors mean and how to encode them.
         fit: Choose the signs of quaternions and turns of arm angles from the data.
-        keep: Keep the joint vectors beside the encoded actions, in ``source.action``.
+        keep: Keep what the actions replace, see :func:`er_il.datasets.source_columns.columns_to_keep`.
         finish: Called with the target's folder before it takes its name.
         advance: Called with the number of frames done since the last call.
 
@@ -56,11 +62,10 @@ def encode_dataset(
         )
     vectors = source.vectors(column)
     layout = layout.fitted(vectors) if fit else layout
+    kept = columns_to_keep(source, layout, column, vectors, keep)
+    columns = {**kept.columns, ACTION: _encoded(source, layout, vectors)}
     with atomic_folder(target) as partial:
-        copies = {}
-        if keep and column == ACTION and layout.kind != JOINT:
-            copies[SOURCE_ACTION] = Copy(_kept(source.features[ACTION], layout), ACTION)
-        rewrite(source, partial, {ACTION: _encoded(source, layout, vectors)}, copies, advance)
+        rewrite(source, partial, columns, kept.copies, kept.dropped, advance)
         bound_rotation_deviation(partial)
         finish(partial)
 
@@ -74,6 +79,9 @@ def decode_dataset(
     advance: Advance = lambda frames: None,
 ) -> list[DecodedEpisode]:
     """Write ``source`` again with its encoded actions decoded to joint vectors, then encoded by ``layout``.
+
+    In joint space, the actions' feature and the columns that encoding took away are again what they were before
+    (:func:`er_il.datasets.source_columns.columns_to_restore`).
 
     Like :func:`encode_dataset`, but nothing of the source is read apart from its actions and the
     measured joints, where IK starts. Signs and turns are chosen from the data.
@@ -89,7 +97,12 @@ def decode_dataset(
     with atomic_folder(target) as partial:
         decoded = decode_episodes(encoded_by, read_encoded_episodes(source, encoded_by), cores(), advance)
         vectors = np.concatenate([episode.vectors for episode in decoded]).astype(np.float32)
-        rewrite(source, partial, {ACTION: _encoded(source, layout.fitted(vectors), vectors)}, {})
+        actions = _encoded(source, layout.fitted(vectors), vectors)
+        restored = SourceColumns()
+        if found := columns_to_restore(source, layout):
+            feature, restored = found
+            actions = Column(feature, actions.values)
+        rewrite(source, partial, {ACTION: actions}, restored.copies, restored.dropped)
         bound_rotation_deviation(partial)
         finish(partial)
     return decoded
@@ -100,9 +113,6 @@ def _encoded(source: Dataset, layout: Layout, vectors: Floats) -> Column:
     episodes = [layout.encode(vectors[rows]).astype(np.float32) for rows in source.episodes.values()]
     recorded = source.features[ACTION]
     feature = recorded | action_feature(layout)
-    feature["info"] = (recorded.get("info") or {}) | feature["info"]
+    before = recorded_action(source)
+    feature["info"] = (recorded.get("info") or {}) | ({RECORDED: before} if before else {}) | feature["info"]
     return Column(feature, np.concatenate(episodes))
-
-
-def _kept(recorded: Feature, layout: Layout) -> Feature:
-    return recorded | {"names": list(layout.names), "info": None}

@@ -9,8 +9,9 @@ import numpy as np
 from er_il.arms.arm import Arm
 from er_il.datasets.dataset import Dataset
 from er_il.datasets.decoding import decode_episodes, read_encoded_episodes
+from er_il.datasets.described import described
 from er_il.datasets.number_checks import check_numbers
-from er_il.datasets.wiring import Wiring, wire
+from er_il.datasets.wiring import Wiring
 from er_il.spaces.base import Array
 from er_il.support.errors import DatasetError
 
@@ -53,7 +54,7 @@ def read_joint_paths(root: Path, wirings: Sequence[Wiring] = (), workers: int = 
     dataset = Dataset(root)
     if not dataset.specified and not wirings:
         raise DatasetError(f"{root} does not say which arm it is of: give --arm, and --joints for its joints.")
-    layout = dataset.layout if dataset.specified else wire(wirings, dataset.features, "joint", "quat")
+    dataset, layout = (dataset, dataset.layout) if dataset.specified else described(dataset, wirings)
     check_numbers(dataset, layout)
     truth = dataset.joints_column(layout)
     episodes = read_encoded_episodes(dataset, layout, truth)

@@ -12,11 +12,11 @@ Positive = Annotated[StrictInt, Field(ge=1)]
 
 
 class FeatureInfo(BaseModel):
-    """A column; its names are a list, or a mapping of lists or numbers in older datasets."""
+    """A column; its names are a list, or lists in a list, or a mapping of lists or numbers in older datasets."""
 
     dtype: Annotated[StrictStr, Field(pattern=r"^(video|image|string|language|bool|u?int\d+|float\d+)$")]
     shape: Annotated[tuple[Positive, ...], Field(min_length=1)]
-    names: list[Name] | Mapping[StrictStr, list[Name] | StrictInt] | None = None
+    names: list[Name | list[Name]] | Mapping[StrictStr, list[Name] | StrictInt] | None = None
     info: Mapping[StrictStr, Any] | None = None
 
 

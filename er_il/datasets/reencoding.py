@@ -6,14 +6,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from er_il.datasets.assembled import Assembled
+from er_il.datasets.column_source import ColumnSource
 from er_il.datasets.dataset import Dataset
+from er_il.datasets.described import described
+from er_il.datasets.history import SPECIFICATION, read_history
 from er_il.datasets.hub import find_dataset
 from er_il.datasets.integrity import check_whole
 from er_il.datasets.number_checks import check_numbers
+from er_il.datasets.schema import SOURCE, STATE
 from er_il.datasets.weights import WeightsFile
-from er_il.datasets.wiring import Wiring, wire
+from er_il.datasets.wiring import Wiring
 from er_il.spaces.joint import JOINT
 from er_il.spaces.layout import Layout
+from er_il.spaces.spec import ACTION
 from er_il.support.atomic_files import check_absent, check_outside, check_writable
 from er_il.support.errors import DatasetError
 
@@ -24,6 +30,7 @@ class Reencoded:
 
     layout: Layout  # of its actions
     statuses: Counter[str]  # decoded commands by er_il.Status; empty if nothing had to be decoded
+    notes: tuple[str, ...]  # what its user should know, a sentence or more each
 
 
 def reencode(
@@ -49,7 +56,7 @@ def reencode(
         rotation: ``quat`` or ``rot6d``.
         wirings: The arms of a dataset that does not know them.
         weights: Of ERX; those of the arms if omitted.
-        keep: Keep the joint vectors beside the encoded actions.
+        keep: Keep the joint vectors and what else the source has as actions, where no policy reads them.
         on_progress: Called with the number of frames done, and their total.
 
     Raises:
@@ -61,19 +68,22 @@ def reencode(
         raise DatasetError(f"{source} says which arms it is of: leave out --arm and --arms.")
     if not dataset.specified and not wirings:
         raise DatasetError(f"{source} does not say which arm it is of: give --arm, and --joints for its joints.")
-    known = dataset.layout if dataset.specified else wire(wirings, dataset.features, JOINT, rotation)
+    check_whole(dataset)
+    dataset, known = (dataset, dataset.layout) if dataset.specified else described(dataset, wirings)
     layout = known.in_space(kind, rotation, weights.of(known.arms) if weights else {})
     encoded = dataset.specified and dataset.spec["space"] != JOINT
     decode = encoded and (kind == JOINT or dataset.joints_column(layout) is None)
     check_absent(target)
     check_outside(target, dataset.root)
     check_writable(target)
-    check_whole(dataset)
     check_numbers(dataset, layout if not encoded else dataset.layout)
     from er_il.datasets import card  # LeRobot: seconds of imports; mistakes are told before
     from er_il.datasets.encoding import decode_dataset, encode_dataset
+    from er_il.datasets.source_columns import columns_to_restore, other_actions
 
-    card.read_history(dataset.root)  # raises if it is damaged
+    read_history(dataset.root)  # raises if it is damaged
+    restored = decode and columns_to_restore(dataset, layout) is not None
+    notes = _notes(dataset, keep, () if decode else other_actions(dataset))
     done = 0
 
     def advance(frames: int) -> None:
@@ -84,8 +94,9 @@ def reencode(
     def finish(partial: Path) -> None:
         options: dict[str, Any] = {"to": kind, "rotation": rotation, "decoded": decode}
         options |= {"weights": weights.to_dict()["arms"]} if weights else {}
+        options |= _columns(dataset) | ({SPECIFICATION: layout.spec()} if restored else {})
         # A folder is named without its place on this machine.
-        card.sign(Dataset(partial), dataset.root.resolve().name if Path(source).exists() else source, options)
+        card.sign(Dataset(partial), dataset.root.resolve().name if Path(source).exists() else source, options, notes)
 
     statuses: Counter[str] = Counter()
     if decode:
@@ -93,4 +104,38 @@ def reencode(
         statuses.update(status for episode in decoded for status in episode.status.ravel().tolist())
     else:
         encode_dataset(dataset, target, layout, keep=keep, fit=True, finish=finish, advance=advance)
-    return Reencoded(Dataset(target).layout, statuses)
+    return Reencoded(Dataset(target).layout, statuses, notes)
+
+
+def _columns(dataset: Dataset) -> dict[str, list[str]]:
+    """Where the joint vectors and the measured joints are from, if not from their usual columns."""
+    parts = dataset.parts if isinstance(dataset, Assembled) else {}
+    keys = {ACTION: "from", STATE: "state_from"}
+    return {
+        keys[name]: [f"{_owner(source, dataset)}{source.column}:{','.join(source.names)}" for source in part.sources]
+        for name, part in parts.items()
+    }
+
+
+def _owner(source: ColumnSource, dataset: Dataset) -> str:
+    return "" if source.dataset.root == dataset.root else f"{source.dataset.root.resolve().name}:"
+
+
+def _notes(dataset: Dataset, keep: bool, moved: Sequence[str]) -> tuple[str, ...]:
+    """What is not as in the source, and what is lost."""
+    notes = []
+    columns = _columns(dataset)
+    if said := columns.get("from"):
+        notes.append(f"The joint vectors are from {'; '.join(said)}.")
+    if isinstance(dataset, Assembled) and dataset.measured:
+        notes.append(
+            f"What {', '.join(dataset.measured)} measured in the next frame stands for the command; the last frame of "
+            "an episode commands where the arm is. How far the arm stayed behind its commands, and how hard it pushed "
+            "against what held it, is lost."
+        )
+    if said := columns.get("state_from"):
+        notes.append(f"{STATE} is from {'; '.join(said)}.")
+    if moved:
+        where = f"are named {SOURCE}* now" if keep else "were left out"
+        notes.append(f"{', '.join(moved)} {where}: LeRobot takes every column named {ACTION}* for actions.")
+    return tuple(notes)

@@ -3,7 +3,7 @@
 import functools
 import os
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -48,9 +48,10 @@ def rewrite(
     target: Path,
     columns: Mapping[str, Column],
     copies: Mapping[str, Copy],
+    dropped: Collection[str] = (),
     advance: Advance = lambda frames: None,
 ) -> None:
-    """Write ``source`` as ``target`` with columns replaced or added.
+    """Write ``source`` as ``target`` with columns replaced, added or left out.
 
     These columns, their features and their statistics are what LeRobot would have written; all else
     stays. Videos are hard links where the file system allows.
@@ -60,6 +61,7 @@ def rewrite(
         target: Folder that does not exist.
         columns: Columns of the target that the source lacks or has otherwise.
         copies: Columns of the target that the source has under other names.
+        dropped: Columns that the source has and the target has not.
         advance: Told about progress.
 
     Raises:
@@ -68,6 +70,7 @@ def rewrite(
     check_links(source.root)
     info = load_info(source.root)
     info.features |= {name: each.feature for name, each in [*columns.items(), *copies.items()]}
+    info.features = {name: feature for name, feature in info.features.items() if name not in dropped}
     _copy(source.root, target)
     schema = get_hf_features_from_features(info.features).arrow_schema
     stats: dict[int, Stats] = {}
@@ -81,10 +84,12 @@ def rewrite(
             episode: dict[str, list[str] | NDArray[Any]] = {name: array[frames] for name, array in values.items()}
             stats[table.column(EPISODE)[frames.start].as_py()] = compute_episode_stats(episode, info.features)
             advance(frames.stop - frames.start)
-        table = _with_columns(_with_copies(table, copies, schema), values, schema)
+        table = _with_copies(table, copies, schema).drop_columns(list(dropped))
+        table = _with_columns(table, values, schema)
         write_table_one_row_group_per_episode(table, _new(target, source.root, path))
     for path in parquet_files(source.root / EPISODES):
-        episodes = _with_stats(_with_copied_stats(read_table(path), copies), stats)
+        episodes = _without_stats(_with_copied_stats(read_table(path), copies), dropped)
+        episodes = _with_stats(episodes, stats)
         pq.write_table(episodes, _new(target, source.root, path))
     # LeRobot adds one episode after the other; the same order gives the same digits.
     total: Stats = functools.reduce(
@@ -92,7 +97,8 @@ def rewrite(
     )
     before = load_stats(source.root) or {}
     copied = {name: before[copy.of] for name, copy in copies.items() if copy.of in before}
-    write_stats(before | copied | total, target)
+    kept = {name: own for name, own in before.items() if name not in dropped}
+    write_stats(kept | copied | total, target)
     write_info(info, target)
 
 
@@ -128,6 +134,11 @@ def _with_copied_stats(episodes: pa.Table, copies: Mapping[str, Copy]) -> pa.Tab
             statistic = column.removeprefix(prefix)
             episodes = _with_column(episodes, f"stats/{name}/{statistic}", episodes.column(column))
     return episodes
+
+
+def _without_stats(episodes: pa.Table, names: Collection[str]) -> pa.Table:
+    prefixes = tuple(f"stats/{name}/" for name in names)
+    return episodes.drop_columns([column for column in episodes.column_names if column.startswith(prefixes)])
 
 
 def _with_column(table: pa.Table, field: pa.Field | str, values: pa.Array | pa.ChunkedArray) -> pa.Table:

@@ -63,14 +63,14 @@ def check_joint_values(given: JointSample) -> str:
     if not len(sample.values):
         return "There is no frame in which all joint values are numbers."
     q = sample.motors.angles(sample.values)
-    beyond, off = _share_outside(sample.arm, q), _position_error(sample.arm, q, sample.positions)
+    beyond, off = share_outside(sample.arm, q), _position_error(sample.arm, q, sample.positions)
     still = sample.motors.units == "deg" and np.abs(q).max() < STATIONARY
     order = _order_by_name(sample)
     if beyond <= OUTSIDE_TOLERANCE and off <= POSITION_TOLERANCE and not still and order is None:
         return ""
     found = [order] if order is not None else []
     for cause in _causes(sample):
-        if _share_outside(cause.arm, cause.q) > OUTSIDE_TOLERANCE:
+        if share_outside(cause.arm, cause.q) > OUTSIDE_TOLERANCE:
             continue
         better = _position_error(cause.arm, cause.q, sample.positions)
         if off > POSITION_TOLERANCE and better > max(POSITION_TOLERANCE, off / IMPROVEMENT):
@@ -185,7 +185,7 @@ def _few(rows: Array) -> Array:
     return rows[np.unique(np.linspace(0, len(rows) - 1, ORDER_SAMPLES).astype(int))]
 
 
-def _share_outside(arm: Arm, q: Array) -> float:
+def share_outside(arm: Arm, q: Array) -> float:
     """Share of joint values that are outside their limits."""
     return float(((q < arm.lower - LIMIT_TOLERANCE) | (q > arm.upper + LIMIT_TOLERANCE)).mean())
 

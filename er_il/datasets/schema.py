@@ -13,7 +13,9 @@ IMAGES = "observation.images."
 # Side columns. LeRobot makes every action* column a policy output and every observation* column an input.
 LEADER_JOINTS = "leader.joints"
 DEMO_SEED = "demo.seed"
-SOURCE_ACTION = "source.action"  # in a dataset re-encoded from another: its actions as they were
+SOURCE = "source."  # before the names of columns of a dataset that was re-encoded from another, as they were there
+SOURCE_ACTION = SOURCE + "action"
+SOURCE_JOINTS = SOURCE + "joints"  # the joint vectors that were encoded, where its actions were something else
 
 Feature = dict[str, Any]
 
@@ -43,12 +45,21 @@ def action_feature(layout: Layout) -> Feature:
 
 
 def dimension_names(feature: Feature) -> tuple[str, ...]:
-    """Names of a column's dimensions; their numbers if it names none."""
-    names = feature.get("names")
-    if isinstance(names, Mapping):  # such as {"motors": [...]}, which older datasets have, or {"x": 0, "y": 1}
-        names = [each for name, group in names.items() for each in (group if isinstance(group, list) else [name])]
+    """Names of a column's dimensions, no two the same; their numbers if it does not name them all.
+
+    Names may be nested, as in ``[["a", "b"]]`` (Unitree) or ``{"axes": ["a", "b"]}``. Those that occur more than once,
+    such as LIBERO's two ``gripper``, are numbered: ``gripper_1``, ``gripper_2``.
+    """
+    names = _flat(feature.get("names") or [])
+    found = [f"{each}_{names[: i + 1].count(each)}" if names.count(each) > 1 else each for i, each in enumerate(names)]
     count = math.prod(feature["shape"])
-    return tuple(map(str, names)) if names and len(names) == count else tuple(map(str, range(count)))
+    return tuple(found) if len(found) == len(set(found)) == count else tuple(map(str, range(count)))
+
+
+def _flat(names: Any) -> list[str]:
+    if isinstance(names, Mapping):  # such as {"motors": [...]}, which older datasets have, or {"x": 0, "y": 1}
+        return [each for name, group in names.items() for each in (_flat(group) if isinstance(group, list) else [name])]
+    return [each for name in names for each in (_flat(name) if isinstance(name, list) else [str(name)])]
 
 
 def _vector(names: tuple[str, ...]) -> Feature:

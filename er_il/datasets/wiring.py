@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from pydantic import StrictFloat, StrictInt, StrictStr
+from pydantic import ConfigDict, Field, StrictFloat, StrictInt, StrictStr
 
 from er_il.arms.arm import Arm, ArmAngleFrames
 from er_il.arms.presets import PRESETS
@@ -23,8 +23,21 @@ Numbers = tuple[StrictInt | StrictFloat, ...]
 SUFFIX = ".pos"  # LeRobot's name for the position of a motor
 
 
+class JointsNotFoundError(DatasetError):
+    """No dimensions are named as an arm's joints."""
+
+    def __init__(self, arm: Arm, label: str, names: Sequence[str]) -> None:
+        self.arm, self.label = arm, label
+        super().__init__(
+            f"Which dimensions are the joints of {arm.name} ({', '.join(arm.joints)})? Name them, in this order, "
+            f"with --joints or in a file of arms. There are: {', '.join(names)}."
+        )
+
+
 class Wiring(Declaration):
     """One arm: its kinematics, and the dimensions that hold its joints. Empty values are guessed or left out."""
+
+    model_config = ConfigDict(populate_by_name=True)
 
     noun = "wiring"
     error = DatasetError
@@ -36,7 +49,9 @@ class Wiring(Declaration):
     urdf_joints: Names = ()
     redundant: Names = ()
     angle_frames: Names = ()  # shoulder, elbow, wrist
-    joints: Names = ()  # dimensions of the action, in the order of the arm's joints
+    from_: Names = Field(default=(), validation_alias="from")  # columns with the joints; the action if empty
+    state_from: Names = ()  # columns with the measured joints; the state if empty
+    joints: Names = ()  # dimensions of the action, or of these columns, in the order of the arm's joints
     state_joints: Names = ()  # likewise of the state
     units: StrictStr = "rad"
     signs: Numbers = ()
@@ -74,7 +89,9 @@ class Wiring(Declaration):
     def part(self, kind: str, rotation: str, names: Sequence[str], state_names: Sequence[str]) -> Part:
         """Wire the arm to the dimensions of the joint vector and the state."""
         arm = self.build_arm()
-        joints = self.joints or _joints_named_as(arm, names)
+        joints = self.joints or joints_named_as(arm, names)
+        if joints is None:
+            raise JointsNotFoundError(arm, self.label, names)
         for joint in joints:
             if joint not in names:
                 raise UnknownNameError("dimension of the action", joint, names)
@@ -136,12 +153,10 @@ def _wirings(entries: object, folder: Path) -> list[Wiring]:
     return found
 
 
-def _joints_named_as(arm: Arm, names: Sequence[str]) -> tuple[str, ...]:
+def joints_named_as(arm: Arm, names: Sequence[str]) -> tuple[str, ...] | None:
+    """The dimensions that are named as an arm's joints, with or without :data:`SUFFIX`; None unless all are."""
     for suffix in (SUFFIX, ""):
         joints = tuple(joint + suffix for joint in arm.joints)
         if set(joints) <= set(names):
             return joints
-    raise DatasetError(
-        f"Which dimensions are the joints of {arm.name} ({', '.join(arm.joints)})? Name them, in this order, "
-        f"with --joints or in a file of arms. There are: {', '.join(names)}."
-    )
+    return None

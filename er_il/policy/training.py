@@ -20,7 +20,6 @@ from er_il.envs.contract import Contract
 from er_il.policy.configuration import input_features, named_inputs, read_config
 from er_il.policy.training_data import check_training_data
 from er_il.spaces.registry import AND, check_space, split_name
-from er_il.spaces.spec import action_spec
 from er_il.support.atomic_files import work_folder, write_atomically
 from er_il.support.errors import DatasetError, PolicyError
 from er_il.support.json_files import read_json
@@ -56,7 +55,7 @@ class Training:
             raise PolicyError(f"{self.steps} training steps train nothing; ask for at least one.")
         if not self.config.is_file():
             raise PolicyError(f"There is no training configuration {self.config}.")
-        spec = action_spec(Dataset(self.dataset).features)
+        spec = Dataset(self.dataset).spec
         kind, choice = split_name(self.space)
         if spec["space"] != kind:
             raise DatasetError(f"The dataset at {self.dataset} holds {spec['space']} actions, not {kind}.")
@@ -69,8 +68,8 @@ class Training:
         last = self._checkpoint
         if last is not None:
             return [STOCK, f"--config_path={last / _PRETRAINED / 'train_config.json'}", "--resume=true", *self._length]
-        info = Dataset(self.dataset).info
-        contract = Contract.of_spec(action_spec(info["features"]))
+        dataset = Dataset(self.dataset)
+        info, contract = dataset.info, Contract.of_spec(dataset.spec)
         inputs = input_features(self.config, info["features"])
         own = self._renames(inputs)
         return [

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from safetensors import safe_open
 
-from er_il.datasets.schema import LEADER_JOINTS, SOURCE_ACTION
+from er_il.datasets.schema import LEADER_JOINTS, SOURCE_ACTION, SOURCE_JOINTS
 from er_il.envs.contract import Contract, decodes, policy_tags
 from er_il.envs.origin import at_hand, policy_file, training_info
 from er_il.envs.trust import POSTPROCESSOR, read_processor
@@ -120,7 +120,7 @@ def action_space_of(policy: str) -> str | None:
 
 def _by_statistics(policy: str) -> str | None:
     for means in _means(policy):
-        for column in (LEADER_JOINTS, SOURCE_ACTION):
+        for column in (LEADER_JOINTS, SOURCE_JOINTS, SOURCE_ACTION):
             if column in means and ACTION in means:
                 joints, actions = means[column], means[ACTION]
                 same = joints.shape == actions.shape and np.allclose(joints, actions, rtol=0, atol=CLOSE)

@@ -136,8 +136,9 @@ def _message(cause: ValidationError, noun: str, valid: Mapping[str, Any]) -> str
             continue
         text = each["msg"].removeprefix("Value error, ")
         said.append(f"{where} is {reprlib.repr(each['input'])}: {text}." if where else f"{text}.")
+    keys = [str(getattr(field, "validation_alias", None) or name) for name, field in valid.items()]
     if found["missing"]:
         said.insert(0, f"The {noun} lacks {', '.join(found['missing'])}.")
     if found["extra_forbidden"]:
-        said.insert(0, f"A {noun} has no {', '.join(found['extra_forbidden'])}. Valid: {', '.join(valid)}.")
+        said.insert(0, f"A {noun} has no {', '.join(found['extra_forbidden'])}. Valid: {', '.join(keys)}.")
     return " ".join(said[:MOST_MISTAKES])
