@@ -86,15 +86,17 @@ def assembled(dataset: Dataset, wirings: Sequence[Wiring]) -> tuple[Dataset, lis
     Raises:
         ErIlError: there is no such column or dimension, or two arms share one.
     """
-    if not any(each.from_ or each.state_from for each in wirings):
+    elsewhere = any(set(each.from_) - {ACTION} for each in wirings)
+    state_elsewhere = any(set(each.state_from) - {STATE} for each in wirings)
+    if not (elsewhere or state_elsewhere):
         return dataset, list(wirings)
     here = (STATE,) if STATE in dataset.features else ()
     actions = [_sources(dataset, each.from_ or (ACTION,)) for each in wirings]
     states = [_sources(dataset, each.state_from or here) for each in wirings]
     parts = {}
-    if any(each.from_ for each in wirings):
+    if elsewhere:
         parts[ACTION] = _assembly(actions)
-    if any(each.state_from for each in wirings):
+    if state_elsewhere:
         parts[STATE] = _assembly(states)
     action, state = parts.get(ACTION) or _assembly(actions), parts.get(STATE) or _assembly(states)
     resolved = [

@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
@@ -34,11 +35,9 @@ class ColumnSource:
             DatasetError: there is no such dataset, its episodes or frames are others, or the column holds no vectors.
         """
         words = text.split(":")
-        if words[0] in dataset.features or len(words) == 1:
-            owner = dataset
-        else:
-            owner = Dataset(find_dataset(words.pop(0)))
-            check_same_frames(dataset, owner)
+        owner = dataset
+        if words[0] not in dataset.features and len(words) > 1:
+            owner = _other_dataset(words.pop(0), dataset)
         column, *chosen = words
         if column not in owner.features:
             raise UnknownNameError(f"column of {owner.root}", column, vector_columns(owner))
@@ -51,6 +50,12 @@ class ColumnSource:
             if name not in names:
                 raise UnknownNameError(f"dimension of {column}", name, names)
         return cls(owner, column, wanted or names)
+
+    @property
+    def text(self) -> str:
+        """The column, and its dimensions if they are not all, as :meth:`parse` reads them."""
+        some = "" if self.names == self.dataset.names(self.column) else f":{','.join(self.names)}"
+        return f"{self.column}{some}"
 
     @property
     def measured(self) -> bool:
@@ -83,6 +88,14 @@ def following(values: Floats, episodes: Iterable[slice]) -> Floats:
     ends = [each.stop - 1 for each in episodes]
     rows[ends] = ends
     return values[rows]
+
+
+def _other_dataset(name: str, dataset: Dataset) -> Dataset:
+    if "/" not in name and not Path(name).exists():
+        raise UnknownNameError("column, or folder of a dataset,", name, vector_columns(dataset))
+    other = Dataset(find_dataset(name))
+    check_same_frames(dataset, other)
+    return other
 
 
 def vector_columns(dataset: Dataset) -> list[str]:

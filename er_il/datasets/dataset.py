@@ -208,10 +208,11 @@ def conversion(version: str, root: Path, repository: str = "") -> str:
         root: Its folder; the converter replaces it, and leaves the old one beside it.
         repository: Its id on the hub, from where the converter downloads it if the folder is not there.
     """
-    first = "" if version == "v2.1" else "with an older LeRobot to v2.1, then "
+    first = "" if version == "v2.1" else "to v2.1 with an older LeRobot, then "
     name = repository or f"local/{root.resolve().name}"
     options = f"--repo-id={name} --root={shlex.quote(str(root))} --push-to-hub=false"
-    return f"Convert it: {first}python -m lerobot.scripts.convert_dataset_v21_to_v30 {options}"
+    command = f"python -m lerobot.scripts.convert_dataset_v21_to_v30 {options}"
+    return f"Convert it {first}with: {command} (the old one stays in {root.name}_old)"
 
 
 def datasets_in(folder: Path) -> list[Path]:

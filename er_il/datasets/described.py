@@ -32,7 +32,8 @@ def described(dataset: Dataset, wirings: Sequence[Wiring]) -> tuple[Dataset, Lay
     """
     if ACTION not in dataset.features and not any(each.from_ for each in wirings):
         hints = [proposal(dataset, each.build_arm(), each.label) for each in wirings]
-        raise DatasetError(" ".join([f"{dataset.root} has no column {ACTION}: give --from.", *filter(None, hints)]))
+        given = "name the columns of the joints with --from or in the file of arms."
+        raise DatasetError(" ".join([f"{dataset.root} has no column {ACTION}: {given}", *filter(None, hints)]))
     whole, resolved = assembled(dataset, wirings)
     try:
         layout = wire(resolved, whole.features, JOINT, "quat")

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from er_il.datasets.dataset import INFO, datasets_in
+from er_il.datasets.dataset import INFO, conversion, datasets_in
 from er_il.support.errors import DatasetError
 
 
@@ -21,9 +21,13 @@ def find_dataset(source: str) -> Path:
         return folder  # whoever reads it says what is wrong with it
     import httpx
     from lerobot.datasets import LeRobotDataset  # seconds of imports that a folder does without
+    from lerobot.datasets.utils import BackwardCompatibilityError
 
     try:
         return Path(LeRobotDataset(source, video_backend="pyav").root)
+    except BackwardCompatibilityError as error:
+        how = conversion("v2.1", Path(Path(source).name), source)
+        raise DatasetError(f"{source} is a LeRobot dataset of version v2.1, not v3.0. {how}") from error
     # huggingface_hub's own errors are OSErrors and ValueErrors; without a network, its client's come through.
     except (OSError, ValueError, NotImplementedError, httpx.HTTPError) as error:
         reason = (str(error).strip() or type(error).__name__).splitlines()[0]

@@ -44,11 +44,6 @@ class Proposal:
         """The other dimensions of the column."""
         return [name for name in self.source.dataset.names(self.source.column) if name not in self.source.names]
 
-    @property
-    def alone(self) -> str:
-        """The joints alone, as :meth:`ColumnSource.parse` reads it."""
-        return f"{self.source.column}:{','.join(self.source.names)}" if self.rest else self.source.column
-
     def angles(self) -> Array:
         """The angles (N, n) [rad]."""
         return self.source.read() * UNITS[self.units]
@@ -67,7 +62,7 @@ def find_joints(dataset: Dataset, arm: Arm, label: str = "", exclude: str = "") 
     for column in vector_columns(dataset):
         if not column.startswith((SOURCE, exclude or SOURCE)) and not NO_ANGLES.search(column):
             found += _in_column(dataset, column, arm, label)
-    return sorted(found, key=lambda each: (each.source.measured, "joint" not in each.source.column))
+    return sorted(found, key=lambda each: (each.source.measured, each.source.column != ACTION))
 
 
 def proposal(dataset: Dataset, arm: Arm, label: str = "", exclude: str = "") -> str:
@@ -77,12 +72,16 @@ def proposal(dataset: Dataset, arm: Arm, label: str = "", exclude: str = "") -> 
         return ""
     keys = _keys(dataset, arm, found)
     if label:
-        lists = {key: "deg" if key == "units" else f"[{', '.join(values)}]" for key, values in keys.items()}
+        lists = {key: "deg" if key == "units" else _yaml(values) for key, values in keys.items()}
         given = f"{', '.join(f'{key}: {text}' for key, text in lists.items())} in its entry of the file of arms"
     else:
         given = " ".join(f"--{key.replace('_', '-')} {' '.join(values)}" for key, values in keys.items())
     others = f" Or in {'; '.join(each.text for each in found[1:MOST])}." if found[1:] else ""
     return f"The joints of {label or arm.name} seem to be in {found[0].text}: give {given or 'the arm alone'}.{others}"
+
+
+def _yaml(values: Sequence[str]) -> str:
+    return f"[{', '.join(f'"{value}"' if ':' in value else value for value in values)}]"
 
 
 def _in_column(dataset: Dataset, column: str, arm: Arm, label: str) -> list[Proposal]:
@@ -93,7 +92,7 @@ def _in_column(dataset: Dataset, column: str, arm: Arm, label: str) -> list[Prop
         return []
     rows = np.unique(np.linspace(0, dataset.frames - 1, SAMPLES).astype(int))
     values = dataset.vectors(column)[rows].astype(np.float64)
-    for chosen in sorted(candidates, key=lambda each: not all(label in name for name in each)):
+    for chosen in sorted(candidates, key=lambda each: not all(label in name.lower() for name in each)):
         own = values[:, [names.index(name) for name in chosen]]
         units = "rad" if np.abs(own).max() <= TURN else "deg"
         q = own * UNITS[units]
@@ -117,7 +116,8 @@ def _candidates(arm: Arm, names: Sequence[str]) -> Iterator[tuple[str, ...]]:
     groups: dict[str, list[str]] = {}
     for name in possible:
         groups.setdefault(re.sub(r"\d+", "#", name), []).append(name)
-    for group in (*groups.values(), possible):
+    sides = ([name for name in possible if side in name.lower()] for side in ("left", "right"))
+    for group in (*groups.values(), *sides, possible):
         if len(group) == arm.dof:
             yield tuple(sorted(group, key=_number) if all(re.search(r"\d", name) for name in group) else group)
 
@@ -143,7 +143,7 @@ def _keys(dataset: Dataset, arm: Arm, found: Sequence[Proposal]) -> dict[str, li
     gripper = _gripper(dataset, best)
     keys: dict[str, list[str]] = {}
     if gripper:
-        keys["from"] = [best.alone, gripper]
+        keys["from"] = [best.source.text, gripper]
     elif best.source.column != ACTION:
         keys["from"] = [best.source.column]
     if not gripper and joints_named_as(arm, best.source.names) is None and (best.rest or best.source.column == ACTION):
@@ -157,7 +157,7 @@ def _state_keys(dataset: Dataset, best: Proposal, measured: Sequence[Proposal]) 
     in_state = next((each for each in measured if each.source.column == STATE), None)
     if in_state is None:
         here = [STATE] if STATE in dataset.features else []
-        return {"state_from": [measured[0].alone, *here]} if measured else {}
+        return {"state_from": [measured[0].source.text, *here]} if measured else {}
     same = in_state.source.names == best.source.names and (best.source.named or best.source.column in (ACTION, STATE))
     return {} if same else {"state_joints": list(in_state.source.names)}
 

@@ -111,14 +111,13 @@ def _columns(dataset: Dataset) -> dict[str, list[str]]:
     """Where the joint vectors and the measured joints are from, if not from their usual columns."""
     parts = dataset.parts if isinstance(dataset, Assembled) else {}
     keys = {ACTION: "from", STATE: "state_from"}
-    return {
-        keys[name]: [f"{_owner(source, dataset)}{source.column}:{','.join(source.names)}" for source in part.sources]
-        for name, part in parts.items()
-    }
+    return {keys[name]: [_named(source, dataset) for source in part.sources] for name, part in parts.items()}
 
 
-def _owner(source: ColumnSource, dataset: Dataset) -> str:
-    return "" if source.dataset.root == dataset.root else f"{source.dataset.root.resolve().name}:"
+def _named(source: ColumnSource, dataset: Dataset) -> str:
+    """A column, after the name of its dataset if that is another one; not its place on this machine."""
+    other = source.dataset.root != dataset.root
+    return f"{source.dataset.root.resolve().name}:{source.text}" if other else source.text
 
 
 def _notes(dataset: Dataset, keep: bool, moved: Sequence[str]) -> tuple[str, ...]:
@@ -136,6 +135,6 @@ def _notes(dataset: Dataset, keep: bool, moved: Sequence[str]) -> tuple[str, ...
     if said := columns.get("state_from"):
         notes.append(f"{STATE} is from {'; '.join(said)}.")
     if moved:
-        where = f"are named {SOURCE}* now" if keep else "were left out"
-        notes.append(f"{', '.join(moved)} {where}: LeRobot takes every column named {ACTION}* for actions.")
+        what = f"Renamed to {SOURCE}*" if keep else "Left out"
+        notes.append(f"{what}, since LeRobot takes every column named {ACTION}* for actions: {', '.join(moved)}.")
     return tuple(notes)

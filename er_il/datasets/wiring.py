@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import ConfigDict, Field, StrictFloat, StrictInt, StrictStr
+from pydantic import BeforeValidator, ConfigDict, Field, StrictFloat, StrictInt, StrictStr
 
 from er_il.arms.arm import Arm, ArmAngleFrames
 from er_il.arms.presets import PRESETS
@@ -17,7 +17,13 @@ from er_il.support.declaration import Declaration, read_declaration
 from er_il.support.errors import ArmError, DatasetError, UnknownNameError
 from er_il.support.resources import data_dir
 
-Names = tuple[StrictStr, ...]
+
+def _words(values: object) -> object:
+    """Names that are numbers, as of dimensions without names, as words: YAML reads them as numbers."""
+    return [str(each) if type(each) is int else each for each in values] if isinstance(values, list) else values
+
+
+Names = Annotated[tuple[StrictStr, ...], BeforeValidator(_words)]
 Numbers = tuple[StrictInt | StrictFloat, ...]
 
 SUFFIX = ".pos"  # LeRobot's name for the position of a motor
