@@ -16,6 +16,7 @@ from chains import write_chain
 from documented import PAGES, ROOT, Block, blocks, entry_point, run, train_in_process
 from foreign import write_bimanual, write_one_arm, write_openarm
 from lerobot.policies.act.configuration_act import ACTConfig
+from public_schemas import libero, uma
 
 import er_il.cli
 from er_il import Arm
@@ -54,11 +55,17 @@ def prepare_real_arm(folder: Path) -> None:
     ACTConfig(device="cpu").save_pretrained(folder / "policies/reach_erj_robot")
 
 
+def prepare_reencoding(folder: Path) -> None:
+    write_bimanual(folder / "my_robot")
+    uma(folder / "poses")
+    libero(folder / "deltas")
+
+
 # What a reader of the page has already.
 PREPARED: dict[str, Callable[[Path], object]] = {
     "docs/arms.md": lambda folder: write_chain(folder / "my_arm.urdf", 7),
     "docs/real_arm.md": prepare_real_arm,
-    "docs/reencode.md": lambda folder: write_bimanual(folder / "my_robot"),
+    "docs/reencode.md": prepare_reencoding,
 }
 
 

@@ -31,10 +31,13 @@ class Assembly:
     def names_of(self, source: ColumnSource) -> dict[str, str]:
         """The name of each dimension of a column in the vectors.
 
-        Before numbers, and where two columns have the same name, stands the column's.
+        Where two columns have the same name, and before numbers, stands the column's: the third dimension of one column
+        is not the third of another. LeRobot's own columns, alone, keep their names.
         """
         every = Counter(name for each in self.sources for name in each.names)
-        prefix = "" if source.named and all(every[name] == 1 for name in source.names) else f"{source.column}."
+        alone = len(self.sources) == 1 and source.column in (ACTION, STATE)
+        distinct = source.named and all(every[name] == 1 for name in source.names)
+        prefix = "" if alone or distinct else f"{source.column}."
         return {name: prefix + name for name in source.names}
 
     @property
