@@ -22,6 +22,7 @@ from public_schemas import (
     G1,
     LENGTHS,
     PANDA,
+    Columns,
     agibot,
     droid,
     joint_paths,
@@ -40,11 +41,13 @@ from er_il.datasets.dataset import Dataset
 from er_il.datasets.described import described
 from er_il.datasets.history import read_history
 from er_il.datasets.joint_paths import read_joint_paths
+from er_il.datasets.proposals import find_joints
 from er_il.datasets.schema import SOURCE_ACTION, SOURCE_JOINTS, STATE, dimension_names
 from er_il.datasets.verification import verify
 from er_il.datasets.wiring import Wiring, read_wirings
 from er_il.robots.processors import DecodePolicyAction
 from er_il.spaces.spec import ACTION
+from er_il.support.errors import DatasetError
 
 SCHEMAS = {each.__name__: each for each in (droid, uma, libero, unitree, agibot)}
 COMMANDED = np.concatenate(joint_paths()).astype(np.float32)
@@ -124,10 +127,7 @@ def test_joints_beside_poses_are_proposed_and_the_proposal_works(places: Path, t
     error = er_il(*encode)
     assert "Which dimensions are the joints of panda" in error
     assert "The joints of panda seem to be in action.joint_position (joint_0, " in error
-    assert (
-        "Or in observation.state (joint_0, joint_1, joint_2, joint_3, joint_4, joint_5, joint_6; rad, measured)."
-        in (error)
-    )
+    assert f"Or in observation.state ({', '.join(DROID_JOINTS)}; rad, measured)." in error
     assert given(error) == ["--from", "action.joint_position", "action:gripper"]
     said = er_il(*encode, *given(error))
     assert "The joint vectors are from action.joint_position; action:gripper." in said
@@ -229,6 +229,30 @@ def test_two_arms_in_one_column_without_names(places: Path, tmp_path: Path, er_i
     (tmp_path / "left.yaml").write_text(f"left: {{arm: panda, {proposed[1]}}}")
     _, layout = described(source, read_wirings(tmp_path / "left.yaml"))
     assert len(layout.parts[0].motors.state) == 7
+
+
+def test_names_of_sides_and_spellings_tell_which_arm_is_which(places: Path) -> None:
+    for label, names in (("left", G1[:7]), ("right", G1[7:])):
+        (first, *_) = find_joints(Dataset(places / "unitree"), PANDA, label)
+        assert (first.source.column, first.source.names) == (ACTION, tuple(names))
+        (first, *_) = find_joints(Dataset(places / "agibot"), PANDA, label)
+        assert first.source.names == tuple("0123456" if label == "left" else ("7", "8", "9", "10", "11", "12", "13"))
+
+
+def test_joint_changes_are_told_from_a_column_of_joints_beside_them(tmp_path: Path) -> None:
+    names = {ACTION: None, "action.joint_position": None, STATE: None}
+    episodes: list[Columns] = [
+        {ACTION: np.diff(q, axis=0), "action.joint_position": q[1:], STATE: q[:-1]} for q in joint_paths()
+    ]
+    dataset = Dataset(write_columns(tmp_path / "changes", names, episodes))
+    with pytest.raises(
+        DatasetError, match=r"0, 1, .* look like changes .* give --from action.joint_position --state-j"
+    ):
+        described(dataset, [Wiring(arm="panda", joints=tuple("0123456"))])
+    degrees = [{"action.joints": np.rad2deg(q)} for q in joint_paths()]
+    dataset = Dataset(write_columns(tmp_path / "degrees", {"action.joints": None}, degrees))
+    with pytest.raises(DatasetError, match=r"has no column action: .* give --from action.joints --units deg\.$"):
+        described(dataset, [Wiring(arm="panda")])
 
 
 def test_what_is_left_out_is_said(places: Path, tmp_path: Path, er_il) -> None:

@@ -21,7 +21,7 @@ MOST = 3  # that are named
 SAMPLES = 500  # frames that are looked at
 TURN = 2 * np.pi + 0.1  # [rad] values beyond are degrees
 STILL = 1e-3  # [rad] a column that moves less tells nothing
-NO_ANGLES = re.compile(r"vel|effort|torque|current|accel|force|wrench|cartesian|pose|eef|ee_|end[._]|tcp", re.I)
+NO_ANGLES = re.compile(r"vel|effort|torque|current|accel|force|wrench|cartesian|pose|eef|ee_|end[._]|tcp|delta", re.I)
 GRIPPER = re.compile(r"gripper|effector|hand|finger", re.I)
 POSE = re.compile(r"((ee|eef|tcp|hand|pose|pos|rot|left|right)[._]?)*(r?[xyz]|q[xyzw]|roll|pitch|yaw)", re.I)
 
@@ -60,9 +60,14 @@ def find_joints(dataset: Dataset, arm: Arm, label: str = "", exclude: str = "") 
     """
     found = []
     for column in vector_columns(dataset):
-        if not column.startswith((SOURCE, exclude or SOURCE)) and not NO_ANGLES.search(column):
-            found += _in_column(dataset, column, arm, label)
-    return sorted(found, key=lambda each: (each.source.measured, each.source.column != ACTION))
+        if column == exclude or column.startswith(SOURCE) or NO_ANGLES.search(column):
+            continue
+        if own := _in_column(dataset, column, arm, label):
+            found.append(own)
+    return sorted(
+        found,
+        key=lambda each: (each.source.measured, each.source.column != ACTION, label not in each.source.column.lower()),
+    )
 
 
 def proposal(dataset: Dataset, arm: Arm, label: str = "", exclude: str = "") -> str:
@@ -77,49 +82,51 @@ def proposal(dataset: Dataset, arm: Arm, label: str = "", exclude: str = "") -> 
     else:
         given = " ".join(f"--{key.replace('_', '-')} {' '.join(values)}" for key, values in keys.items())
     others = f" Or in {'; '.join(each.text for each in found[1:MOST])}." if found[1:] else ""
-    return f"The joints of {label or arm.name} seem to be in {found[0].text}: give {given or 'the arm alone'}.{others}"
+    return f"The joints of {label or arm.name} seem to be in {found[0].text}: give {given}.{others}"
 
 
 def _yaml(values: Sequence[str]) -> str:
     return f"[{', '.join(f'"{value}"' if ':' in value else value for value in values)}]"
 
 
-def _in_column(dataset: Dataset, column: str, arm: Arm, label: str) -> list[Proposal]:
-    """The first candidate in a column whose values could be the arm's."""
+def _in_column(dataset: Dataset, column: str, arm: Arm, label: str) -> Proposal | None:
+    """The likeliest dimensions of a column whose values could be the arm's."""
     names = dataset.names(column)
-    candidates = list(_candidates(arm, names))
+    candidates = list(_candidates(arm, names, label))
     if not candidates:
-        return []
+        return None
     rows = np.unique(np.linspace(0, dataset.frames - 1, SAMPLES).astype(int))
     values = dataset.vectors(column)[rows].astype(np.float64)
-    for chosen in sorted(candidates, key=lambda each: not all(label in name.lower() for name in each)):
+    for chosen in candidates:
         own = values[:, [names.index(name) for name in chosen]]
         units = "rad" if np.abs(own).max() <= TURN else "deg"
         q = own * UNITS[units]
-        angles = np.isfinite(q).all() and np.ptp(q, axis=0).max() > STILL
-        if angles and share_outside(arm, q) <= OUTSIDE_TOLERANCE:
-            source = ColumnSource(dataset, column, chosen)
-            if "joint" in column or any("joint" in name for name in chosen) or not stays_around_zero(q):
-                return [Proposal(source, units)]
-    return []
+        moves = np.isfinite(q).all() and np.ptp(q, axis=0).max() > STILL
+        if not moves or share_outside(arm, q) > OUTSIDE_TOLERANCE:
+            continue
+        if not stays_around_zero(q) or any("joint" in name for name in (column, *chosen)):
+            return Proposal(ColumnSource(dataset, column, chosen), units)
+    return None
 
 
-def _candidates(arm: Arm, names: Sequence[str]) -> Iterator[tuple[str, ...]]:
+def _candidates(arm: Arm, names: Sequence[str], label: str) -> Iterator[tuple[str, ...]]:
     """Dimensions that could be the joints of an arm by their names, the likeliest first."""
     if named := joints_named_as(arm, names) or _spelt_otherwise(arm, names):
         yield named
     if all(name.isdecimal() for name in names):
-        half = len(names) // 2  # of two arms, perhaps
-        yield from (tuple(names[first : first + arm.dof]) for first in (0, half) if first + arm.dof <= len(names))
+        halves = (0, len(names) // 2)  # of two arms, perhaps, the left one first
+        for first in reversed(halves) if "right" in label.lower() else halves:
+            if len(chosen := tuple(names[first : first + arm.dof])) == arm.dof:
+                yield chosen
         return
     possible = [name for name in names if not (POSE.fullmatch(name) or GRIPPER.search(name) or NO_ANGLES.search(name))]
     groups: dict[str, list[str]] = {}
     for name in possible:
         groups.setdefault(re.sub(r"\d+", "#", name), []).append(name)
     sides = ([name for name in possible if side in name.lower()] for side in ("left", "right"))
-    for group in (*groups.values(), *sides, possible):
-        if len(group) == arm.dof:
-            yield tuple(sorted(group, key=_number) if all(re.search(r"\d", name) for name in group) else group)
+    fitting = [group for group in (*groups.values(), *sides, possible) if len(group) == arm.dof]
+    for group in sorted(fitting, key=lambda each: not all(label in name.lower() for name in each)):
+        yield tuple(sorted(group, key=_number) if all(re.search(r"\d", name) for name in group) else group)
 
 
 def _number(name: str) -> int:
@@ -167,11 +174,11 @@ def _gripper(dataset: Dataset, joints: Proposal) -> str:
     if not joints.source.measured and any(GRIPPER.search(name) for name in joints.rest):
         return ""
     for column, feature in dataset.features.items():
-        if not column.startswith(ACTION) or column == joints.source.column or len(feature["shape"]) != 1:
+        commanded = column.startswith(ACTION) and "vel" not in column and len(feature["shape"]) == 1
+        if not commanded or column == joints.source.column:
             continue
-        dimensions = [name for name in dataset.names(column) if GRIPPER.search(name)]
-        if "vel" not in column and GRIPPER.search(column):
+        if GRIPPER.search(column):
             return column
-        if dimensions and "vel" not in column:
+        if dimensions := [name for name in dataset.names(column) if GRIPPER.search(name)]:
             return f"{column}:{','.join(dimensions)}"
     return ""
