@@ -140,7 +140,8 @@ def test_joints_beside_poses_are_proposed_and_the_proposal_works(places: Path, t
     before = json.loads((places / "uma/meta/stats.json").read_text())
     assert kept["source.action.joint_position"] == before["action.joint_position"]
     assert "action.joint_position" not in kept
-    assert LeRobotDataset("lab/out", root=tmp_path / "out", video_backend="pyav")[3][SOURCE_JOINTS].shape == (8,)
+    frame = LeRobotDataset("lab/out", root=tmp_path / "out", video_backend="pyav").__getitem__(3)
+    assert frame[SOURCE_JOINTS].shape == (8,)
 
 
 @pytest.mark.parametrize(
@@ -203,7 +204,8 @@ def test_back_in_joints_lerobot_merges_it_with_the_source(
     aggregate_datasets(["lab/a", "lab/b"], "lab/merged", roots=[places / name, tmp_path / "back"], aggr_root=merged)
     loaded = LeRobotDataset("lab/merged", root=merged, video_backend="pyav")
     assert loaded.num_frames == 2 * sum(LENGTHS)
-    assert np.allclose(loaded[0][ACTION], loaded[sum(LENGTHS)][ACTION], atol=1e-3)
+    first, again = (loaded.__getitem__(row) for row in (0, sum(LENGTHS)))
+    assert np.allclose(first[ACTION], again[ACTION], atol=1e-3)
     checked_again = verify(tmp_path / "back", 1, lambda done, total: None)  # the record says what its actions mean
     assert not checked_again.broken()
     er_il("encode", tmp_path / "back", "--to", "task", "--out", tmp_path / "task")

@@ -46,7 +46,7 @@ class Proposal:
 
     def angles(self) -> Array:
         """The angles (N, n) [rad]."""
-        return self.source.read() * UNITS[self.units]
+        return self.source.read().astype(np.float64) * UNITS[self.units]
 
 
 def find_joints(dataset: Dataset, arm: Arm, label: str = "", exclude: str = "") -> list[Proposal]:
