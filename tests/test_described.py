@@ -35,6 +35,7 @@ from public_schemas import (
 
 from er_il import Arm
 from er_il.cli import USER_MISTAKE, main
+from er_il.cli.arm_options import ArmOptions
 from er_il.datasets.changes import are_changes
 from er_il.datasets.column_source import following
 from er_il.datasets.dataset import Dataset
@@ -352,6 +353,21 @@ def test_paths_of_joints_are_read_from_any_column(places: Path) -> None:
         measured = lagged(q).astype(np.float32)
         assert np.array_equal(path.measured, measured)
         assert np.array_equal(path.commanded, np.concatenate([measured[1:], measured[-1:]]))
+
+
+def test_columns_of_the_options_are_those_of_all_arms_of_a_file(places: Path) -> None:
+    source = Dataset(places / "unitree")
+    dataset, layout = described(source, ArmOptions(arms=places / "arms.yaml", from_=(STATE,)).wirings())
+    assert dataset.names(ACTION) == source.names(STATE)
+    expected = following(source.vectors(STATE), source.episodes.values())
+    assert np.array_equal(dataset.vectors(ACTION), expected)
+    measured = dataset.measured_joints(layout)
+    assert measured is not None
+    for first, part in zip((0, 7), layout.parts, strict=True):
+        assert np.allclose(layout.angles(part, expected), expected[:, first : first + 7])
+        assert np.allclose(layout.angles(part, measured), source.vectors(STATE)[:, first : first + 7])
+    own = ArmOptions(arms=places / "agibot.yaml", from_=("ignored",)).wirings()  # where the file says nothing
+    assert own == read_wirings(places / "agibot.yaml")
 
 
 def test_numbers_of_unnamed_dimensions_do_not_tie_a_state_to_joints(tmp_path: Path) -> None:
