@@ -98,10 +98,7 @@ def decode_dataset(
 def _encoded(source: Dataset, layout: Layout, vectors: Floats) -> Column:
     """Encode joint vectors, an episode at a time so that rotations stay continuous within it."""
     episodes = [layout.encode(vectors[rows]).astype(np.float32) for rows in source.episodes.values()]
-    recorded = source.features[ACTION]
-    feature = recorded | action_feature(layout)
-    feature["info"] = (recorded.get("info") or {}) | feature["info"]
-    return Column(feature, np.concatenate(episodes))
+    return Column(action_feature(layout, source.features[ACTION]), np.concatenate(episodes))
 
 
 def _kept(recorded: Feature, layout: Layout) -> Feature:

@@ -11,11 +11,10 @@ from er_il.datasets.hub import find_dataset
 from er_il.datasets.integrity import check_whole
 from er_il.datasets.number_checks import check_numbers
 from er_il.datasets.weights import WeightsFile
-from er_il.datasets.wiring import Wiring, wire
+from er_il.datasets.wiring import Wiring, layout_of
 from er_il.spaces.joint import JOINT
 from er_il.spaces.layout import Layout
 from er_il.support.atomic_files import check_absent, check_outside, check_writable
-from er_il.support.errors import DatasetError
 
 
 @dataclass(frozen=True)
@@ -35,6 +34,7 @@ def reencode(
     wirings: Sequence[Wiring],
     weights: WeightsFile | None = None,
     keep: bool,
+    repo_id: str = "",
     on_progress: Callable[[int, int], object],
 ) -> Reencoded:
     """Write a dataset again with its actions in another action space.
@@ -50,6 +50,7 @@ def reencode(
         wirings: The arms of a dataset that does not know them.
         weights: Of ERX; those of the arms if omitted.
         keep: Keep the joint vectors beside the encoded actions.
+        repo_id: Where the target will be on the hub, for its card.
         on_progress: Called with the number of frames done, and their total.
 
     Raises:
@@ -57,11 +58,7 @@ def reencode(
         FileExistsError: the target exists.
     """
     dataset = Dataset(find_dataset(source))
-    if dataset.specified and wirings:
-        raise DatasetError(f"{source} says which arms it is of: leave out --arm and --arms.")
-    if not dataset.specified and not wirings:
-        raise DatasetError(f"{source} does not say which arm it is of: give --arm, and --joints for its joints.")
-    known = dataset.layout if dataset.specified else wire(wirings, dataset.features, JOINT, rotation)
+    known = layout_of(dataset, wirings)
     layout = known.in_space(kind, rotation, weights.of(known.arms) if weights else {})
     encoded = dataset.specified and dataset.spec["space"] != JOINT
     decode = encoded and (kind == JOINT or dataset.joints_column(layout) is None)
@@ -85,7 +82,8 @@ def reencode(
         options: dict[str, Any] = {"to": kind, "rotation": rotation, "decoded": decode}
         options |= {"weights": weights.to_dict()["arms"]} if weights else {}
         # A folder is named without its place on this machine.
-        card.sign(Dataset(partial), dataset.root.resolve().name if Path(source).exists() else source, options)
+        name = dataset.root.resolve().name if Path(source).exists() else source
+        card.sign(Dataset(partial), name, options, repo_id)
 
     statuses: Counter[str] = Counter()
     if decode:

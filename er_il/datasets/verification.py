@@ -1,7 +1,7 @@
 """Verification of an encoded dataset: round-trip errors, singularities, and sanity checks of its joint values."""
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from er_il.datasets.integrity import check_whole
 from er_il.datasets.number_checks import Problems, number_problems
 from er_il.datasets.sanity_checks import JointSample, check_joint_values
 from er_il.datasets.schema import STATE
+from er_il.datasets.wiring import Wiring, layout_of
 from er_il.kinematics.goal import POSITION_TOLERANCE, ROTATION_TOLERANCE
 from er_il.kinematics.rotation import Quaternion
 from er_il.kinematics.search import at_limits
@@ -23,6 +24,7 @@ from er_il.spaces.joint_choice import singular_intervals
 from er_il.spaces.layout import Layout, Part
 from er_il.spaces.pose import POSITION_NAMES, TASK, PoseSpace
 from er_il.spaces.round_trip import EXACT, SINGULAR
+from er_il.support.errors import DatasetError
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -122,40 +124,63 @@ class Verification:
         }
 
 
-def verify(root: Path, workers: int, on_progress: Callable[[int, int], object]) -> Verification:
+def verify(
+    root: Path,
+    workers: int,
+    on_progress: Callable[[int, int], object],
+    wirings: Sequence[Wiring] = (),
+    chosen: Collection[int] = (),
+) -> Verification:
     """Decode a dataset's actions and compare them with the joint vectors that were encoded.
 
     Seeds are the measured joints where the state has them, as on the robot, else the joint vector of
     the step before.
 
     Args:
-        root: Folder of a dataset that says what its actions mean.
+        root: Folder of a dataset.
         workers: Number of worker processes.
         on_progress: Called with the number of frames done, and their total.
+        wirings: The arms of a dataset that does not know them; its actions are their joints.
+        chosen: Numbers of the episodes to look at; all if empty.
 
     Raises:
-        ErIlError: it does not say so, or is no dataset.
+        ErIlError: nothing says what its actions mean, it is no dataset, or has no such episode.
     """
     dataset = Dataset(root)
-    layout = dataset.layout
+    layout = layout_of(dataset, wirings)
     check_whole(dataset)
     truth = dataset.joints_column(layout)
-    episodes = read_encoded_episodes(dataset, layout, truth)
-    problems = number_problems(dataset, layout)
+    episodes = chosen_episodes(read_encoded_episodes(dataset, layout, truth), chosen)
+    numbers = {episode.number for episode in episodes}
+    problems = {number: texts for number, texts in number_problems(dataset, layout).items() if number in numbers}
     findings = _findings(dataset, layout, episodes)
     done = 0
 
     def advance(frames: int) -> None:
         nonlocal done
         done += frames
-        on_progress(done, dataset.frames)
+        on_progress(done, sum(len(episode.actions) for episode in episodes))
 
     decoded = decode_episodes(layout, episodes, workers, advance)
-    checked = tuple(_check(layout, *each) for each in zip(episodes, decoded, strict=True))
+    checked = tuple(check_episode(layout, *each) for each in zip(episodes, decoded, strict=True))
     return Verification(layout, checked, truth is not None, findings, _other_side(layout, episodes), problems)
 
 
-def _check(layout: Layout, episode: EncodedEpisode, decoded: DecodedEpisode) -> CheckedEpisode:
+def chosen_episodes(episodes: list[EncodedEpisode], chosen: Collection[int]) -> list[EncodedEpisode]:
+    """The episodes of these numbers; all if none are given.
+
+    Raises:
+        DatasetError: there is none of such a number.
+    """
+    if missing := sorted(set(chosen) - {episode.number for episode in episodes}):
+        raise DatasetError(
+            f"There is no episode {', '.join(map(str, missing))}. Valid: {episodes[0].number} to {episodes[-1].number}."
+        )
+    return [episode for episode in episodes if not chosen or episode.number in chosen]
+
+
+def check_episode(layout: Layout, episode: EncodedEpisode, decoded: DecodedEpisode) -> CheckedEpisode:
+    """Compare what an episode decodes to with what was encoded."""
     error = np.full(decoded.status.shape, np.nan)
     at_limit = np.empty(decoded.status.shape, dtype=bool)
     for p, part in enumerate(layout.parts):
@@ -214,6 +239,8 @@ def _findings(dataset: Dataset, layout: Layout, episodes: list[EncodedEpisode]) 
     found = {}
     for part in layout.parts:
         positions = None if measured is None else _measured_positions(dataset, part.label)
+        if positions is not None:
+            positions = np.concatenate([positions[dataset.episodes[each.number]] for each in episodes])
         values = (vectors if positions is None or measured is None else measured)[:, layout.indices(part)]
         if text := check_joint_values(JointSample(part.space.arm, part.motors, values, positions)):
             found[part.label or part.space.arm.name] = text

@@ -8,7 +8,10 @@ from pydantic import StrictFloat, StrictInt, StrictStr
 
 from er_il.arms.arm import Arm, ArmAngleFrames
 from er_il.arms.presets import PRESETS
+from er_il.datasets.dataset import Dataset
 from er_il.datasets.schema import STATE, Feature, dimension_names
+from er_il.kinematics.rotation import Quaternion
+from er_il.spaces.joint import JOINT
 from er_il.spaces.layout import Layout, Part
 from er_il.spaces.motors import Motors
 from er_il.spaces.registry import make_arm_space
@@ -95,6 +98,29 @@ def wire(wirings: Sequence[Wiring], features: Mapping[str, Feature], kind: str, 
     names = dimension_names(features[ACTION])
     state_names = dimension_names(features[STATE]) if STATE in features else ()
     return Layout(names, tuple(wiring.part(kind, rotation, names, state_names) for wiring in wirings))
+
+
+def layout_of(dataset: Dataset, wirings: Sequence[Wiring], option: str = "--arm") -> Layout:
+    """The layout of a dataset's actions: its own, or the one in joint space that follows from the wirings.
+
+    Args:
+        dataset: The dataset.
+        wirings: The arms of a dataset that does not know them; where it does, and its actions are joints, the same.
+        option: What declares an arm, for messages.
+
+    Raises:
+        ErIlError: neither says which arms it is of, or they contradict each other.
+    """
+    if not dataset.specified:
+        if not wirings:
+            raise DatasetError(
+                f"{dataset.root} does not say which arm it is of: give {option}, and --joints for its joints."
+            )
+        return wire(wirings, dataset.features, JOINT, Quaternion.kind)
+    own = dataset.layout
+    if wirings and (own.kind != JOINT or wire(wirings, dataset.features, JOINT, Quaternion.kind).spec() != own.spec()):
+        raise DatasetError(f"{dataset.root} says which arms it is of: leave out {option} and --arms.")
+    return own
 
 
 def read_wirings(path: Path) -> list[Wiring]:
