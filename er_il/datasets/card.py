@@ -57,9 +57,9 @@ def sign(dataset: Dataset, source: str, options: dict[str, Any], repo_id: str = 
     fresh = create_lerobot_dataset_card(dataset_info=load_info(dataset.root), repo_id=repo_id)
     card = _read_card(file.read_text(), fresh) if file.exists() else fresh
     stale = {*SPACES, *PRESETS}
-    tags = [tag for tag in card.data.tags or [] if tag not in stale]
+    tags = [tag for tag in card.data.get("tags") or [] if tag not in stale]
     own = ("LeRobot", "er_il", dataset.layout.kind, *(arm.name for arm in dataset.layout.arms.values()))
-    card.data.tags = list(dict.fromkeys([*tags, *own]))
+    card.data["tags"] = list(dict.fromkeys([*tags, *own]))
     text = re.sub(f"\n*{_START}.*{_END}\n*", "\n", _BADGE.sub("", card.text), flags=re.DOTALL).strip()
     badge = next(iter(_BADGE.findall(fresh.text)), "").strip()
     section = "\n".join([_START, _section(dataset, source, options.get("retargeted", {})), _END])

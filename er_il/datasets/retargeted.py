@@ -167,7 +167,7 @@ def _follow(
     if measured is not None:
         goals[MEASURED] = [retargeting.goals(q) for q in measured]
         near = zip(goals[MEASURED], paths[COMMANDED], strict=True)
-        paths[MEASURED] = [retargeting.reached(*each, retargeting.within(fps)) for each in near]
+        paths[MEASURED] = [retargeting.reached(*each, within=retargeting.within(fps)) for each in near]
     deviations = {
         what: [retargeting.deviation(*each, fps) for each in zip(goals[what], paths[what], strict=True)]
         for what in paths

@@ -37,7 +37,7 @@ def retargeting_report(retargeted: Retargeted) -> dict[str, Any]:
 
 def _summary(deviations: Sequence[Deviation], arm: Arm) -> dict[str, Any]:
     """Frames by what became of them, the largest deviations, and the joints at limits and beyond their speeds."""
-    limits = sum(each.at_limit[each.missed].sum(axis=0) for each in deviations)
+    limits = np.sum([each.at_limit[each.missed].sum(axis=0) for each in deviations], axis=0)
     speeds = np.max([each.speed.max(axis=0) for each in deviations], axis=0)
     counted = {what: int(sum(getattr(each, what).sum() for each in deviations)) for what in COUNTED}
     largest = {f"{what}_error": float(max(getattr(each, what).max() for each in deviations)) for what in ERRORS}

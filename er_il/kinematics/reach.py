@@ -10,6 +10,7 @@ from er_il.kinematics.forward import forward_of
 
 SAMPLES = 4096  # configurations among which the stretched arm is looked for,
 BEST = 4  # the best of which are improved
+DIGITS = 6  # of a reach [m]: arms of one geometry have one reach
 PARALLEL = 1e-6  # sine of the angle below which two axes have no nearest points
 
 
@@ -44,4 +45,5 @@ def reach(arm: Arm) -> float:
 
     bounds = list(zip(arm.lower, arm.upper, strict=True))
     starts = q[np.argsort(-distances)[:BEST]]
-    return max(-float(minimize(shortfall, start, jac=True, bounds=bounds).fun) for start in starts)
+    found = max(-float(minimize(shortfall, start, jac=True, bounds=bounds).fun) for start in starts)
+    return round(found, DIGITS)

@@ -33,6 +33,7 @@ from er_il.support.errors import ErIlError
 
 Flags = NDArray[np.bool_]
 
+STILL = 1e-9  # [rad] keeps divisions finite
 BATCH = 12  # fewer rows are solved sooner one by one
 SEEDS = 32  # where else a first frame is looked for, if a path from home misses a frame,
 BRANCHES = 3  # and how many of the postures that are found so are followed
@@ -150,11 +151,13 @@ class Retargeting:
     ) -> list[Array]:
         lengths = np.array([len(each) for each in goals])
         paths = [np.empty((length, self.target.dof)) for length in lengths]
-        q = starts
+        q, step = starts.copy(), np.zeros_like(starts)
         for t in range(int(lengths.max())):
             going = np.flatnonzero(lengths > t)
             if t:
-                q[going] = self.reached(np.stack([goals[episode][t] for episode in going]), q[going], self.within(fps))
+                asked = np.stack([goals[episode][t] for episode in going])
+                found = self.reached(asked, q[going], step[going], self.within(fps))
+                step[going], q[going] = found - q[going], found
             for episode in going:
                 paths[episode][t] = q[episode]
             advance(len(going))
@@ -171,26 +174,34 @@ class Retargeting:
                 distinct.append(q)
         return distinct[1 : BRANCHES + 1]
 
-    def reached(self, goals: Array, seeds: Array, within: Vector | float = np.inf) -> Array:
-        """Joint angles (N, n) [rad] near seeds (N, n) that reach goals (N, dim), or come as near as they can.
+    def reached(self, goals: Array, before: Array, step: Array | float = 0.0, within: Vector | float = np.inf) -> Array:
+        """Joint angles (N, n) [rad] that reach goals, or come as near as they can.
 
-        Where a goal is out of reach, or more than ``within`` (n,) [rad] away, as on the other side of a fold, the elbow
-        gives way first: the pose is kept, with the arm angle that is nearest from the seed. Where the pose is out of
-        reach, too, it is the nearest pose (a local minimum of its error, in metres and radians), whatever the elbow.
+        Where a goal is out of reach, or its solution farther than ``within``, as on the other side of a fold, the elbow
+        gives way first: the pose is kept, with the arm angle that is nearest. Where the pose is out of reach, too, it
+        is the nearest pose (a local minimum of its error, in metres and radians), whatever the elbow.
+
+        Args:
+            goals: (N, dim) of :attr:`space`.
+            before: (N, n) [rad] where the arm comes from.
+            step: (N, n) [rad] its last step: at a fold, where two solutions meet, the path goes straight on.
+            within: (n,) [rad] how far each joint may go.
         """
+        seeds = self.target.within_limits(before + step)
         if len(goals) >= BATCH:
             result = self.space.decode_batch(goals, seeds)
             q, exact = result.q, result.status == Status.OK
         else:
             found = [self.space.decode(*each) for each in zip(goals, seeds, strict=True)]
             q, exact = np.array([each.q for each in found]), np.array([each.status is Status.OK for each in found])
-        near = np.all(np.abs(q - seeds) <= within, axis=1)
-        for row in np.flatnonzero(~(exact & near)):
-            q[row] = self._nearest(goals[row], seeds[row], q[row] if near[row] else None)
+        share = np.min(within / np.maximum(np.abs(q - before), STILL), axis=1)  # of the way that may be gone
+        for row in np.flatnonzero(~exact | (share < 1.0)):
+            posture = before[row] + min(1.0, share[row]) * (q[row] - before[row])
+            q[row] = self._nearest(goals[row], before[row], posture)
         return q
 
-    def _nearest(self, goal: Vector, seed: Vector, posture: Vector | None) -> Vector:
-        """Joint angles (n,) [rad] that keep the pose of a goal, their elbow pulled to a posture, or as near as can be."""
+    def _nearest(self, goal: Vector, seed: Vector, posture: Vector) -> Vector:
+        """Joint angles (n,) [rad] that keep a goal's pose, the elbow pulled to a posture, or come as near as can be."""
         T_base_ee, _ = self.space.split(goal)
         kinematics = kinematics_of(self.target)
         relaxed = kinematics.solve(T_base_ee, seed, posture=posture)
