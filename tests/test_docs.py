@@ -125,6 +125,27 @@ def test_every_command_is_run_or_the_page_says_why_not(page: str, monkeypatch: p
 
 
 @pytest.mark.parametrize("page", PAGES)
+def test_options_that_a_page_names_exist(page: str):
+    """In each command that is shown, run here or elsewhere, and by themselves in the text.
+
+    LeRobot's options have a dot; its own commands read them where they are run.
+    """
+    others: set[str] = set()  # options of other programs that the page's commands use
+    for block in blocks(page):
+        for program, *words in block.commands:
+            given = {word.split("=")[0] for word in words if re.match(r"--[a-z]", word)}
+            if program == "er-il" and words and not words[0].startswith("-"):
+                assert given <= options_of(words[0]) | {"--help"}, shlex.join(words)
+            else:
+                others |= given
+    ours = set().union(*map(options_of, er_il.cli.COMMANDS))
+    spans = [span for span in re.findall(r"`([^`\n]+)`", prose(page)) if span.startswith("--")]
+    for span in spans:
+        for option in re.findall(r"(?<![\w-])--[a-z][\w-]*(?![\w.-])", span):
+            assert option in ours | others, f"{page}: {span}"
+
+
+@pytest.mark.parametrize("page", PAGES)
 def test_links_and_pictures_lead_somewhere(page: str):
     for target in re.findall(r"\]\((?!https?://)([^)#]+)", prose(page)):
         assert (ROOT / page).parent.joinpath(target).exists(), target
@@ -144,6 +165,7 @@ def is_run_by(file: str, command: list[str], page: str) -> bool:
     return any(where == page and shlex.join(command).startswith(start) for where, start in taken)
 
 
+@functools.lru_cache
 def options_of(command: str) -> set[str]:
     """The options of one of er-il's commands, by its help."""
     shown = io.StringIO()
