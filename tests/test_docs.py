@@ -54,11 +54,17 @@ def prepare_real_arm(folder: Path) -> None:
     ACTConfig(device="cpu").save_pretrained(folder / "policies/reach_erj_robot")
 
 
+def prepare_panda(folder: Path) -> None:
+    panda = Arm.preset("panda")
+    write_one_arm(folder / "my_robot", panda, [f"{joint}.pos" for joint in panda.joints], degrees=True)
+
+
 # What a reader of the page has already.
 PREPARED: dict[str, Callable[[Path], object]] = {
     "docs/arms.md": lambda folder: write_chain(folder / "my_arm.urdf", 7),
     "docs/real_arm.md": prepare_real_arm,
     "docs/reencode.md": lambda folder: write_bimanual(folder / "my_robot"),
+    "docs/retarget.md": prepare_panda,
 }
 
 

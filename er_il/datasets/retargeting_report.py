@@ -36,7 +36,10 @@ def retargeting_report(retargeted: Retargeted) -> dict[str, Any]:
 
 
 def _summary(deviations: Sequence[Deviation], arm: Arm) -> dict[str, Any]:
-    """Frames by what became of them, the largest deviations, and the joints at limits and beyond their speeds."""
+    """Frames by what became of them, the largest deviations, and what was in the way.
+
+    That are, where a frame is missed, the joints at their limits; no joint is where the arm is stretched, too short.
+    """
     limits = np.sum([each.at_limit[each.missed].sum(axis=0) for each in deviations], axis=0)
     speeds = np.max([each.speed.max(axis=0) for each in deviations], axis=0)
     counted = {what: int(sum(getattr(each, what).sum() for each in deviations)) for what in COUNTED}
@@ -45,6 +48,7 @@ def _summary(deviations: Sequence[Deviation], arm: Arm) -> dict[str, Any]:
         "frames": sum(len(each.position) for each in deviations),
         **counted,
         **largest,
+        "stretched": int(sum((each.off_pose & ~each.at_limit.any(axis=1)).sum() for each in deviations)),
         "limits": {joint: int(count) for joint, count in zip(arm.joints, limits, strict=True) if count},
         "speeds": {joint: float(ratio) for joint, ratio in zip(arm.joints, speeds, strict=True) if ratio > 1.0},
     }
