@@ -12,26 +12,24 @@ from er_il.datasets.decoding import read_encoded_episodes
 from er_il.datasets.hub import find_dataset
 from er_il.datasets.integrity import check_whole
 from er_il.datasets.joint_paths import joint_vectors
+from er_il.datasets.new_arms import exchanged, new_parts
 from er_il.datasets.number_checks import check_numbers
 from er_il.datasets.record import RECORD
 from er_il.datasets.schema import LEADER_JOINTS, SOURCE_ACTION, STATE, action_feature, vector_feature
-from er_il.datasets.wiring import SUFFIX, Wiring, layout_of
+from er_il.datasets.wiring import Wiring, layout_of
 from er_il.kinematics.reach import reach, shoulder
 from er_il.kinematics.rotation import Quaternion
 from er_il.spaces.base import Array
-from er_il.spaces.joint import JOINT
+from er_il.spaces.deviation import Deviation
 from er_il.spaces.layout import Layout, Part
-from er_il.spaces.motors import Motors
 from er_il.spaces.pose import POSITION_NAMES, TASK
 from er_il.spaces.registry import make_arm_space
-from er_il.spaces.retargeting import Deviation, Retargeting
+from er_il.spaces.retargeting import Retargeting
 from er_il.spaces.spec import ACTION
 from er_il.support.atomic_files import atomic_folder, check_absent, check_outside, check_writable
-from er_il.support.errors import DatasetError
 from er_il.support.workers import cores
 
 COMMANDED, MEASURED = "commanded", "measured"
-Exchange = tuple[Sequence[str], Sequence[str]]  # names of dimensions, and those that stand in their place
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,9 +101,9 @@ def retarget(
     """
     dataset = Dataset(find_dataset(source))
     known = layout_of(dataset, wirings, "--from")
-    parts = _new_parts(known, to)
+    parts = new_parts(known, to)
     exchanges = [(part.motors.joints, parts[part.label].motors.joints) for part in known.parts]
-    layout = Layout(_exchanged(known.names, exchanges), tuple(parts.values()))
+    layout = Layout(exchanged(known.names, exchanges), tuple(parts.values()))
     check_absent(target)
     check_outside(target, dataset.root)
     check_writable(target)
@@ -175,40 +173,9 @@ def _follow(
     return paths, deviations
 
 
-def _new_parts(known: Layout, to: Sequence[Wiring]) -> dict[str, Part]:
-    """The new arm in joint space by the label of the old one; its dimensions bear its joints' names if not said."""
-    labels = [part.label for part in known.parts]
-    given = {labels[0]: to[0]} if len(labels) == len(to) == 1 else {wiring.label: wiring for wiring in to}
-    if set(given) != set(labels):
-        raise DatasetError(
-            f"The dataset has several arms: {', '.join(labels)}. Give --to a file of arms with an entry for each."
-            if len(labels) > 1
-            else f"The dataset has one arm, but --to several: {', '.join(given)}."
-        )
-    parts = {}
-    for old in known.parts:
-        wiring, arm = given[old.label], given[old.label].build_arm()
-        prefix = f"{old.label}_" if old.label else ""
-        joints = wiring.joints or tuple(f"{prefix}{joint}{SUFFIX}" for joint in arm.joints)
-        state = (wiring.state_joints or joints) if old.motors.state else ()
-        motors = Motors(joints, wiring.units, wiring.signs, wiring.offsets, state)
-        parts[old.label] = Part(old.label, make_arm_space(JOINT, arm), motors)
-    return parts
-
-
-def _exchanged(names: Sequence[str], exchanges: Sequence[Exchange]) -> tuple[str, ...]:
-    """Names with some of them exchanged, the new ones where the first of the old ones was."""
-    found: list[str] = []
-    for name in names:
-        old, new = next((each for each in exchanges if name in each[0]), ((name,), (name,)))
-        if name == next(each for each in names if each in old):
-            found += new
-    return tuple(found)
-
-
 def _state(dataset: Dataset, arms: Sequence[RetargetedArm]) -> tuple[tuple[str, ...], Floats]:
     """Names and values (N, k) of the state with the new arms' joints and end-effector poses."""
-    names = _exchanged(dataset.names(STATE), [(arm.old.motors.state, arm.new.motors.state) for arm in arms])
+    names = exchanged(dataset.names(STATE), [(arm.old.motors.state, arm.new.motors.state) for arm in arms])
     columns = dict(zip(dataset.names(STATE), dataset.vectors(STATE).T, strict=True))
     for arm in arms:
         pose = make_arm_space(TASK, arm.new.space.arm)

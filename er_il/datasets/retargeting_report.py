@@ -11,7 +11,8 @@ from er_il.datasets.decoding import read_encoded_episodes
 from er_il.datasets.joint_paths import joint_vectors
 from er_il.datasets.retargeted import COMMANDED, Retargeted, RetargetedArm
 from er_il.spaces.base import Array
-from er_il.spaces.retargeting import Deviation, Flags, Retargeting
+from er_il.spaces.deviation import Deviation, Flags
+from er_il.spaces.retargeting import Retargeting
 from er_il.support.errors import DatasetError
 from er_il.support.workers import cores
 

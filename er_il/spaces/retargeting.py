@@ -17,58 +17,24 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from er_il.arms.arm import Arm, Vector
 from er_il.kinematics.arm_angle import STEREO, ArmAngle, wrapped
-from er_il.kinematics.goal import POSITION_TOLERANCE, ROTATION_TOLERANCE
 from er_il.kinematics.reach import reach, shoulder
 from er_il.kinematics.redundancy import Array
 from er_il.kinematics.search import FAR, at_limits
 from er_il.kinematics.solver import Status, kinematics_of
+from er_il.spaces.deviation import Deviation
 from er_il.spaces.pose import TASK, PoseSpace
 from er_il.spaces.registry import ERA_STEREO, make_arm_space
 from er_il.support.errors import ErIlError
-
-Flags = NDArray[np.bool_]
 
 STILL = 1e-9  # [rad] keeps divisions finite
 BATCH = 12  # fewer rows are solved sooner one by one
 SEEDS = 32  # where else a first frame is looked for, if a path from home misses a frame,
 BRANCHES = 3  # and how many of the postures that are found so are followed
 APART = 0.1  # [rad] postures nearer to each other are the same
-
-
-@dataclass(frozen=True, eq=False)
-class Deviation:
-    """How far a path of T frames is from what was asked for."""
-
-    position: Array  # (T,) [m]
-    rotation: Array  # (T,) [rad]
-    arm_angle: Array  # (T,) [rad] 0 where no arm angle is kept
-    at_limit: Flags  # (T, n) joints at a limit
-    speed: Array  # (T, n) [1] of each joint to this frame, by its limit; 0 in the first
-
-    @property
-    def off_pose(self) -> Flags:
-        """Mask (T,) of the frames whose pose is not reached."""
-        return (self.position > POSITION_TOLERANCE) | (self.rotation > ROTATION_TOLERANCE)
-
-    @property
-    def off_elbow(self) -> Flags:
-        """Mask (T,) of the frames whose pose is reached, with another arm angle."""
-        return ~self.off_pose & (self.arm_angle > ROTATION_TOLERANCE)
-
-    @property
-    def too_fast(self) -> Flags:
-        """Mask (T,) of the frames to which a joint moves faster than it can."""
-        return np.any(self.speed > 1.0, axis=1)
-
-    @property
-    def missed(self) -> Flags:
-        """Mask (T,) of the frames that are not reached exactly."""
-        return self.off_pose | self.off_elbow
 
 
 @dataclass(frozen=True, eq=False)
