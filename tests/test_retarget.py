@@ -94,10 +94,10 @@ def test_the_elbow_gives_way_before_the_pose_and_the_pose_as_little_as_can_be() 
 def test_a_path_goes_straight_on_through_a_fold() -> None:
     """The upper arm passes the upright, where ERA's two solutions meet; turning there would leave the demonstration."""
     t = np.linspace(-1, 1, 41)[:, None]
-    q = np.array([0.5, 0.0, 0.4, -1.6, 0.2, 1.7, 0.8]) + t * [0.05, 0.4, 0.0, 0.2, 0.1, 0.1, 0.0]
+    q = np.array([0.5, 0.0, 0.4, -1.6, 0.2, 1.7, 0.8]) + t * [0.3, 0.1, -0.3, 0.1, 0.1, 0.0, 0.0]
     same = Retargeting(PANDA, PANDA, 1.0)
     walked = same._walk([same.goals(q)], q[:1], FPS)[0]
-    assert np.abs(walked - q).max() < 0.01
+    assert np.abs(walked - q).max() < 1e-3  # 15e-3 from the frame before alone
 
 
 def test_speeds_count_by_the_joints_limits() -> None:
