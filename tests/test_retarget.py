@@ -182,7 +182,7 @@ def test_it_is_encoded_and_verified_like_any_other(there: Path, tmp_path: Path, 
     )
     with pytest.raises(SystemExit):
         er_il(monkeypatch, "verify", there / "there", "--episodes", 7, "--out", tmp_path / "none")
-    assert "There is no episode 7. Valid: 0 to 2." in capsys.readouterr().err
+    assert "has no episode 7. Valid: 0 to 2." in capsys.readouterr().err
     with pytest.raises(SystemExit):
         er_il(monkeypatch, "encode", there / "there", "--arm", "panda", "--to", "erj", "--out", tmp_path / "wrong")
     assert len(capsys.readouterr().err.strip().splitlines()) == 1

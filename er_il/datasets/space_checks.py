@@ -9,7 +9,8 @@ import numpy as np
 
 from er_il.datasets.dataset import Dataset
 from er_il.datasets.decoding import decode_episodes, read_encoded_episodes
-from er_il.datasets.verification import Verification, check_episode, chosen_episodes
+from er_il.datasets.selection import selected
+from er_il.datasets.verification import Verification, check_episode
 from er_il.datasets.wiring import Wiring, layout_of
 from er_il.kinematics.rotation import Quaternion
 from er_il.spaces.layout import Layout
@@ -38,7 +39,8 @@ def verify_in_spaces(
     """
     dataset = Dataset(root)
     layout = layout_of(dataset, wirings)
-    episodes = chosen_episodes(read_encoded_episodes(dataset, layout, dataset.joints_column(layout)), chosen)
+    dataset = selected(dataset, chosen)
+    episodes = read_encoded_episodes(dataset, layout, dataset.joints_column(layout))
     truths = [np.asarray(episode.truth) for episode in episodes]
     spaces = _spaces(layout)
     done = 0
@@ -46,7 +48,7 @@ def verify_in_spaces(
     def advance(frames: int) -> None:
         nonlocal done
         done += frames
-        on_progress(done, len(spaces) * sum(map(len, truths)))
+        on_progress(done, len(spaces) * dataset.frames)
 
     found = {}
     for kind, space in spaces.items():
@@ -54,7 +56,7 @@ def verify_in_spaces(
         encoded = [replace(each, actions=fitted.encode(q)) for each, q in zip(episodes, truths, strict=True)]
         decoded = decode_episodes(fitted, encoded, workers, advance)
         checked = tuple(check_episode(fitted, *each) for each in zip(encoded, decoded, strict=True))
-        found[kind] = Verification(fitted, checked, True, {}, {}, {})
+        found[kind] = Verification(fitted, checked, compared=True, findings={}, other_side={}, problems={})
     return found
 
 

@@ -15,6 +15,7 @@ from er_il.datasets.integrity import check_whole
 from er_il.datasets.number_checks import Problems, number_problems
 from er_il.datasets.sanity_checks import JointSample, check_joint_values
 from er_il.datasets.schema import STATE
+from er_il.datasets.selection import selected
 from er_il.datasets.wiring import Wiring, layout_of
 from er_il.kinematics.goal import POSITION_TOLERANCE, ROTATION_TOLERANCE
 from er_il.kinematics.rotation import Quaternion
@@ -24,7 +25,6 @@ from er_il.spaces.joint_choice import singular_intervals
 from er_il.spaces.layout import Layout, Part
 from er_il.spaces.pose import POSITION_NAMES, TASK, PoseSpace
 from er_il.spaces.round_trip import EXACT, SINGULAR
-from er_il.support.errors import DatasetError
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -149,34 +149,21 @@ def verify(
     dataset = Dataset(root)
     layout = layout_of(dataset, wirings)
     check_whole(dataset)
+    dataset = selected(dataset, chosen)
     truth = dataset.joints_column(layout)
-    episodes = chosen_episodes(read_encoded_episodes(dataset, layout, truth), chosen)
-    numbers = {episode.number for episode in episodes}
-    problems = {number: texts for number, texts in number_problems(dataset, layout).items() if number in numbers}
+    episodes = read_encoded_episodes(dataset, layout, truth)
+    problems = number_problems(dataset, layout)
     findings = _findings(dataset, layout, episodes)
     done = 0
 
     def advance(frames: int) -> None:
         nonlocal done
         done += frames
-        on_progress(done, sum(len(episode.actions) for episode in episodes))
+        on_progress(done, dataset.frames)
 
     decoded = decode_episodes(layout, episodes, workers, advance)
     checked = tuple(check_episode(layout, *each) for each in zip(episodes, decoded, strict=True))
     return Verification(layout, checked, truth is not None, findings, _other_side(layout, episodes), problems)
-
-
-def chosen_episodes(episodes: list[EncodedEpisode], chosen: Collection[int]) -> list[EncodedEpisode]:
-    """The episodes of these numbers; all if none are given.
-
-    Raises:
-        DatasetError: there is none of such a number.
-    """
-    if missing := sorted(set(chosen) - {episode.number for episode in episodes}):
-        raise DatasetError(
-            f"There is no episode {', '.join(map(str, missing))}. Valid: {episodes[0].number} to {episodes[-1].number}."
-        )
-    return [episode for episode in episodes if not chosen or episode.number in chosen]
 
 
 def check_episode(layout: Layout, episode: EncodedEpisode, decoded: DecodedEpisode) -> CheckedEpisode:
@@ -239,8 +226,6 @@ def _findings(dataset: Dataset, layout: Layout, episodes: list[EncodedEpisode]) 
     found = {}
     for part in layout.parts:
         positions = None if measured is None else _measured_positions(dataset, part.label)
-        if positions is not None:
-            positions = np.concatenate([positions[dataset.episodes[each.number]] for each in episodes])
         values = (vectors if positions is None or measured is None else measured)[:, layout.indices(part)]
         if text := check_joint_values(JointSample(part.space.arm, part.motors, values, positions)):
             found[part.label or part.space.arm.name] = text
