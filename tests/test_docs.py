@@ -61,11 +61,17 @@ def prepare_reencoding(folder: Path) -> None:
     libero(folder / "deltas")
 
 
+def prepare_panda(folder: Path) -> None:
+    panda = Arm.preset("panda")
+    write_one_arm(folder / "my_robot", panda, [f"{joint}.pos" for joint in panda.joints], degrees=True)
+
+
 # What a reader of the page has already.
 PREPARED: dict[str, Callable[[Path], object]] = {
     "docs/arms.md": lambda folder: write_chain(folder / "my_arm.urdf", 7),
     "docs/real_arm.md": prepare_real_arm,
     "docs/reencode.md": prepare_reencoding,
+    "docs/retarget.md": prepare_panda,
 }
 
 
@@ -132,6 +138,27 @@ def test_every_command_is_run_or_the_page_says_why_not(page: str, monkeypatch: p
 
 
 @pytest.mark.parametrize("page", PAGES)
+def test_options_that_a_page_names_exist(page: str):
+    """In each command that is shown, run here or elsewhere, and by themselves in the text.
+
+    LeRobot's options have a dot; its own commands read them where they are run.
+    """
+    others: set[str] = set()  # options of other programs that the page's commands use
+    for block in blocks(page):
+        for program, *words in block.commands:
+            given = {word.split("=")[0] for word in words if re.match(r"--[a-z]", word)}
+            if program == "er-il" and words and not words[0].startswith("-"):
+                assert given <= options_of(words[0]) | {"--help"}, shlex.join(words)
+            else:
+                others |= given
+    ours = set().union(*map(options_of, er_il.cli.COMMANDS))
+    spans = [span for span in re.findall(r"`([^`\n]+)`", prose(page)) if span.startswith("--")]
+    for span in spans:
+        for option in re.findall(r"(?<![\w-])--[a-z][\w-]*(?![\w.-])", span):
+            assert option in ours | others, f"{page}: {span}"
+
+
+@pytest.mark.parametrize("page", PAGES)
 def test_links_and_pictures_lead_somewhere(page: str):
     for target in re.findall(r"\]\((?!https?://)([^)#]+)", prose(page)):
         assert (ROOT / page).parent.joinpath(target).exists(), target
@@ -151,6 +178,7 @@ def is_run_by(file: str, command: list[str], page: str) -> bool:
     return any(where == page and shlex.join(command).startswith(start) for where, start in taken)
 
 
+@functools.lru_cache
 def options_of(command: str) -> set[str]:
     """The options of one of er-il's commands, by its help."""
     shown = io.StringIO()

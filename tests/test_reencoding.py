@@ -299,7 +299,7 @@ def test_commands_that_cannot_work_are_one_line(places, tmp_path, monkeypatch, c
         (("encode", source, "--to", "polar", *panda[2:], *out), "Unknown action space 'polar'"),
         (("encode", places / "erj", *panda, *out), "leave out --arm"),
         (("encode", source, *panda, "--out", places / "erj"), "The target exists already"),
-        (("verify", source), "does not say what its actions mean"),
+        (("verify", source), "does not say which arm it is of"),
     ):
         _mistake(monkeypatch, *arguments)
         error = capsys.readouterr().err.strip()

@@ -24,6 +24,7 @@ COMMANDS: dict[str, str] = {
     "eval": "eval",
     "generate": "generate",
     "replay": "replay",
+    "retarget": "retarget",
     "study": "study",
     "train": "train",
     "verify": "verify",

@@ -18,6 +18,7 @@ def encode(
     rotation: str = "quat",
     weights: Path | None = None,
     keep: bool = True,
+    repo_id: str = "",
 ) -> None:
     """Write a LeRobot v3 dataset again with its actions in another action space.
 
@@ -35,6 +36,7 @@ def encode(
         rotation: quat or rot6d.
         weights: File of the weights of erx, which er-il advise --fit erx writes; those of the arm if omitted.
         keep: Keep the actions as they were, and other columns of actions, in columns source.*, which no policy reads.
+        repo_id: Repository id that the dataset will have on the hub: its card then links to LeRobot's visualiser.
     """
     from rich.console import Console
 
@@ -55,6 +57,7 @@ def encode(
             wirings=wirings,
             weights=given,
             keep=keep,
+            repo_id=repo_id,
             on_progress=lambda done, total: progress.update(bar, completed=done, total=total, visible=True),
         )
     names = written.layout.encoded_names

@@ -2,14 +2,16 @@
 
 from pathlib import Path
 
-from tyro.conf import Positional
+from tyro.conf import OmitArgPrefixes, Positional
+
+from er_il.cli.arm_options import ArmOptions
 
 
 def view(
     source: Positional[Path],
     *,
+    robot: OmitArgPrefixes[ArmOptions],
     episode: int | None = None,
-    arm: str = "",
     save: Path | None = None,
     spawn: bool = False,
     serve: bool = False,
@@ -21,8 +23,8 @@ def view(
 
     Args:
         source: Folder of a dataset, or the trace (.npz) of a rollout.
+        robot: The arm of a dataset that does not know it; of one that knows several, --arm is the label of one.
         episode: Episode of the dataset; the first if omitted.
-        arm: Arm of a dataset that has several.
         save: File (.rrd) to write.
         spawn: Open the viewer on this screen.
         serve: Serve a viewer for browsers.
@@ -32,9 +34,11 @@ def view(
     import time
     import webbrowser
     from contextlib import suppress
+    from dataclasses import replace
 
     from rich.console import Console
 
+    from er_il.datasets.dataset import Dataset
     from er_il.support.atomic_files import check_writable
     from er_il.support.display import has_display
     from er_il.viewer.destination import check_address, check_file, require_display
@@ -48,7 +52,9 @@ def view(
         check_file(save)
         check_writable(save)
     check_address(address)
-    trace, shapes = read_source(source, episode, arm)
+    labelled = robot.arms is not None or not source.is_dir() or Dataset(source).specified
+    wirings = replace(robot, arm="").wirings() if labelled else robot.wirings()
+    trace, shapes = read_source(source, episode, robot.arm if labelled else "", wirings)
     from er_il.viewer import show  # Rerun: a second of imports
 
     if not shapes:

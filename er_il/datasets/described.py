@@ -9,11 +9,35 @@ from er_il.datasets.changes import are_changes, stays_around_zero
 from er_il.datasets.dataset import Dataset
 from er_il.datasets.proposals import find_joints, proposal
 from er_il.datasets.wiring import JointsNotFoundError, Wiring, wire
+from er_il.kinematics.rotation import Quaternion
 from er_il.spaces.base import Array
 from er_il.spaces.joint import JOINT
 from er_il.spaces.layout import Layout, Part
 from er_il.spaces.spec import ACTION
 from er_il.support.errors import DatasetError
+
+
+def read_layout(dataset: Dataset, wirings: Sequence[Wiring], option: str = "--arm") -> tuple[Dataset, Layout]:
+    """A dataset and the layout of its actions: its own, or in joint space what follows from its user's description.
+
+    Args:
+        dataset: The dataset.
+        wirings: The arms of a dataset that does not know them; where it does, and its actions are joints, the same.
+        option: What declares an arm, for messages.
+
+    Raises:
+        ErIlError: neither says which arms it is of, or they contradict each other.
+    """
+    if not dataset.specified:
+        if not wirings:
+            raise DatasetError(
+                f"{dataset.root} does not say which arm it is of: give {option}, and --joints for its joints."
+            )
+        return described(dataset, wirings)
+    own = dataset.layout
+    if wirings and (own.kind != JOINT or wire(wirings, dataset.features, JOINT, Quaternion.kind).spec() != own.spec()):
+        raise DatasetError(f"{dataset.root} says which arms it is of: leave out {option} and --arms.")
+    return dataset, own
 
 
 def described(dataset: Dataset, wirings: Sequence[Wiring]) -> tuple[Dataset, Layout]:
@@ -36,7 +60,7 @@ def described(dataset: Dataset, wirings: Sequence[Wiring]) -> tuple[Dataset, Lay
         raise DatasetError(" ".join([f"{dataset.root} has no column {ACTION}: {given}", *filter(None, hints)]))
     whole, resolved = assembled(dataset, wirings)
     try:
-        layout = wire(resolved, whole.features, JOINT, "quat")
+        layout = wire(resolved, whole.features, JOINT, Quaternion.kind)
     except JointsNotFoundError as error:
         raise DatasetError(f"{error} {proposal(dataset, error.arm, error.label)}".rstrip()) from error
     for part in layout.parts:

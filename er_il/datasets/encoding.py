@@ -112,7 +112,7 @@ def _encoded(source: Dataset, layout: Layout, vectors: Floats) -> Column:
     """Encode joint vectors, an episode at a time so that rotations stay continuous within it."""
     episodes = [layout.encode(vectors[rows]).astype(np.float32) for rows in source.episodes.values()]
     recorded = source.features[ACTION]
-    feature = recorded | action_feature(layout)
+    feature = action_feature(layout, recorded)
     before = recorded_action(source)
-    feature["info"] = (recorded.get("info") or {}) | ({RECORDED: before} if before else {}) | feature["info"]
+    feature["info"] = feature["info"] | ({RECORDED: before} if before else {})
     return Column(feature, np.concatenate(episodes))

@@ -8,12 +8,12 @@ import numpy as np
 
 from er_il.arms.arm import Arm
 from er_il.datasets.dataset import Dataset
-from er_il.datasets.decoding import decode_episodes, read_encoded_episodes
-from er_il.datasets.described import described
+from er_il.datasets.decoding import EncodedEpisode, decode_episodes, read_encoded_episodes
+from er_il.datasets.described import read_layout
 from er_il.datasets.number_checks import check_numbers
 from er_il.datasets.wiring import Wiring
 from er_il.spaces.base import Array
-from er_il.support.errors import DatasetError
+from er_il.spaces.layout import Layout
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,16 +52,10 @@ def read_joint_paths(root: Path, wirings: Sequence[Wiring] = (), workers: int = 
             numbers cannot be.
     """
     dataset = Dataset(root)
-    if not dataset.specified and not wirings:
-        raise DatasetError(f"{root} does not say which arm it is of: give --arm, and --joints for its joints.")
-    dataset, layout = (dataset, dataset.layout) if dataset.specified else described(dataset, wirings)
+    dataset, layout = read_layout(dataset, wirings)
     check_numbers(dataset, layout)
-    truth = dataset.joints_column(layout)
-    episodes = read_encoded_episodes(dataset, layout, truth)
-    if truth is None:
-        vectors = [decoded.vectors for decoded in decode_episodes(layout, episodes, workers)]
-    else:
-        vectors = [np.asarray(episode.truth) for episode in episodes]
+    episodes = read_encoded_episodes(dataset, layout, dataset.joints_column(layout))
+    vectors = joint_vectors(layout, episodes, workers)
     found = []
     for part in layout.parts:
         paths = []
@@ -72,3 +66,16 @@ def read_joint_paths(root: Path, wirings: Sequence[Wiring] = (), workers: int = 
             paths.append(JointPath(episode.number, commanded, measured))
         found.append(ArmPaths(part.label, part.space.arm, tuple(paths)))
     return found
+
+
+def joint_vectors(layout: Layout, episodes: Sequence[EncodedEpisode], workers: int) -> list[Array]:
+    """The joint vectors (T, D) of each episode: those that were recorded, or else decoded.
+
+    Args:
+        layout: What the episodes' vectors mean.
+        episodes: All of one dataset.
+        workers: Processes that decode.
+    """
+    if any(episode.truth is None for episode in episodes):
+        return [decoded.vectors for decoded in decode_episodes(layout, episodes, workers)]
+    return [np.asarray(episode.truth) for episode in episodes]

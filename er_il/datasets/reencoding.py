@@ -9,7 +9,7 @@ from typing import Any
 from er_il.datasets.assembled import Assembled
 from er_il.datasets.column_source import ColumnSource
 from er_il.datasets.dataset import Dataset
-from er_il.datasets.described import described
+from er_il.datasets.described import read_layout
 from er_il.datasets.history import SPECIFICATION, read_history
 from er_il.datasets.hub import find_dataset
 from er_il.datasets.integrity import check_whole
@@ -21,7 +21,6 @@ from er_il.spaces.joint import JOINT
 from er_il.spaces.layout import Layout
 from er_il.spaces.spec import ACTION
 from er_il.support.atomic_files import check_absent, check_outside, check_writable
-from er_il.support.errors import DatasetError
 
 
 @dataclass(frozen=True)
@@ -42,6 +41,7 @@ def reencode(
     wirings: Sequence[Wiring],
     weights: WeightsFile | None = None,
     keep: bool,
+    repo_id: str = "",
     on_progress: Callable[[int, int], object],
 ) -> Reencoded:
     """Write a dataset again with its actions in another action space.
@@ -57,6 +57,7 @@ def reencode(
         wirings: The arms of a dataset that does not know them.
         weights: Of ERX; those of the arms if omitted.
         keep: Keep the joint vectors and what else the source has as actions, where no policy reads them.
+        repo_id: Where the target will be on the hub, for its card.
         on_progress: Called with the number of frames done, and their total.
 
     Raises:
@@ -64,12 +65,8 @@ def reencode(
         FileExistsError: the target exists.
     """
     dataset = Dataset(find_dataset(source))
-    if dataset.specified and wirings:
-        raise DatasetError(f"{source} says which arms it is of: leave out --arm and --arms.")
-    if not dataset.specified and not wirings:
-        raise DatasetError(f"{source} does not say which arm it is of: give --arm, and --joints for its joints.")
     check_whole(dataset)
-    dataset, known = (dataset, dataset.layout) if dataset.specified else described(dataset, wirings)
+    dataset, known = read_layout(dataset, wirings)
     layout = known.in_space(kind, rotation, weights.of(known.arms) if weights else {})
     encoded = dataset.specified and dataset.spec["space"] != JOINT
     decode = encoded and (kind == JOINT or dataset.joints_column(layout) is None)
@@ -96,7 +93,8 @@ def reencode(
         options |= {"weights": weights.to_dict()["arms"]} if weights else {}
         options |= _columns(dataset) | ({SPECIFICATION: layout.spec()} if restored else {})
         # A folder is named without its place on this machine.
-        card.sign(Dataset(partial), dataset.root.resolve().name if Path(source).exists() else source, options, notes)
+        name = dataset.root.resolve().name if Path(source).exists() else source
+        card.sign(Dataset(partial), name, options, notes, repo_id)
 
     statuses: Counter[str] = Counter()
     if decode:

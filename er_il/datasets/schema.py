@@ -31,17 +31,24 @@ def features(
     image = {"dtype": "video", "shape": (image_size, image_size, 3), "names": ["height", "width", "channels"]}
     return {
         ACTION: action_feature(layout),
-        STATE: _vector(state_names),
-        ENVIRONMENT_STATE: _vector(environment_state_names),
-        LEADER_JOINTS: _vector(layout.names),
+        STATE: vector_feature(state_names),
+        ENVIRONMENT_STATE: vector_feature(environment_state_names),
+        LEADER_JOINTS: vector_feature(layout.names),
         DEMO_SEED: {"dtype": "int64", "shape": (1,), "names": None},
         **{IMAGES + camera: dict(image) for camera in cameras},
     }
 
 
-def action_feature(layout: Layout) -> Feature:
-    """Describe the action column of a layout; its specification travels in ``info``."""
-    return _vector(layout.encoded_names) | {"info": {SPEC: layout.spec()}}
+def action_feature(layout: Layout, recorded: Feature | None = None) -> Feature:
+    """Describe the action column of a layout; its specification travels in ``info``.
+
+    Args:
+        layout: What the actions mean.
+        recorded: Description of the column that it replaces, if any; what else it says is kept.
+    """
+    before = recorded or {}
+    info = (before.get("info") or {}) | {SPEC: layout.spec()}
+    return before | vector_feature(layout.encoded_names) | {"info": info}
 
 
 def dimension_names(feature: Feature) -> tuple[str, ...]:
@@ -62,5 +69,6 @@ def _flat(names: Any) -> list[str]:
     return [each for name in names for each in (_flat(name) if isinstance(name, list) else [str(name)])]
 
 
-def _vector(names: tuple[str, ...]) -> Feature:
+def vector_feature(names: tuple[str, ...]) -> Feature:
+    """Describe a column of vectors with named dimensions."""
     return {"dtype": "float32", "shape": (len(names),), "names": list(names)}

@@ -1,7 +1,7 @@
 """Verification of an encoded dataset: round-trip errors, singularities, and sanity checks of its joint values."""
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,10 +11,13 @@ from numpy.typing import NDArray
 
 from er_il.datasets.dataset import Dataset
 from er_il.datasets.decoding import DecodedEpisode, EncodedEpisode, decode_episodes, read_encoded_episodes
+from er_il.datasets.described import read_layout
 from er_il.datasets.integrity import check_whole
 from er_il.datasets.number_checks import Problems, number_problems
 from er_il.datasets.sanity_checks import JointSample, check_joint_values
 from er_il.datasets.schema import STATE
+from er_il.datasets.selection import selected
+from er_il.datasets.wiring import Wiring
 from er_il.kinematics.goal import POSITION_TOLERANCE, ROTATION_TOLERANCE
 from er_il.kinematics.rotation import Quaternion
 from er_il.kinematics.search import at_limits
@@ -122,23 +125,32 @@ class Verification:
         }
 
 
-def verify(root: Path, workers: int, on_progress: Callable[[int, int], object]) -> Verification:
+def verify(
+    root: Path,
+    workers: int,
+    on_progress: Callable[[int, int], object],
+    wirings: Sequence[Wiring] = (),
+    chosen: Collection[int] = (),
+) -> Verification:
     """Decode a dataset's actions and compare them with the joint vectors that were encoded.
 
     Seeds are the measured joints where the state has them, as on the robot, else the joint vector of
     the step before.
 
     Args:
-        root: Folder of a dataset that says what its actions mean.
+        root: Folder of a dataset.
         workers: Number of worker processes.
         on_progress: Called with the number of frames done, and their total.
+        wirings: The arms of a dataset that does not know them; its actions are their joints.
+        chosen: Numbers of the episodes to look at; all if empty.
 
     Raises:
-        ErIlError: it does not say so, or is no dataset.
+        ErIlError: nothing says what its actions mean, it is no dataset, or has no such episode.
     """
     dataset = Dataset(root)
-    layout = dataset.layout
     check_whole(dataset)
+    dataset, layout = read_layout(dataset, wirings)
+    dataset = selected(dataset, chosen)
     truth = dataset.joints_column(layout)
     episodes = read_encoded_episodes(dataset, layout, truth)
     problems = number_problems(dataset, layout)
@@ -151,11 +163,12 @@ def verify(root: Path, workers: int, on_progress: Callable[[int, int], object]) 
         on_progress(done, dataset.frames)
 
     decoded = decode_episodes(layout, episodes, workers, advance)
-    checked = tuple(_check(layout, *each) for each in zip(episodes, decoded, strict=True))
+    checked = tuple(check_episode(layout, *each) for each in zip(episodes, decoded, strict=True))
     return Verification(layout, checked, truth is not None, findings, _other_side(layout, episodes), problems)
 
 
-def _check(layout: Layout, episode: EncodedEpisode, decoded: DecodedEpisode) -> CheckedEpisode:
+def check_episode(layout: Layout, episode: EncodedEpisode, decoded: DecodedEpisode) -> CheckedEpisode:
+    """Compare what an episode decodes to with what was encoded."""
     error = np.full(decoded.status.shape, np.nan)
     at_limit = np.empty(decoded.status.shape, dtype=bool)
     for p, part in enumerate(layout.parts):

@@ -1,5 +1,6 @@
 """An episode of a dataset as a trace: each action decoded from the measured joints, images and all."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -7,8 +8,10 @@ import numpy as np
 from er_il.arms.portable import arm_spec
 from er_il.datasets.dataset import Dataset
 from er_il.datasets.decoding import decode_episode, read_encoded_episodes
+from er_il.datasets.described import read_layout
 from er_il.datasets.number_checks import check_numbers
 from er_il.datasets.schema import DEMO_SEED, ENVIRONMENT_STATE, STATE
+from er_il.datasets.wiring import Wiring
 from er_il.evaluation.trace import Array, Trace
 from er_il.spaces.action_space import ActionSpace
 from er_il.spaces.layout import Layout, Part
@@ -18,23 +21,24 @@ from er_il.viewer.video import read_images
 GRIPPER = "gripper"  # name of the opening in [0, 1] in what er_il records
 
 
-def trace_of_episode(root: Path, number: int, arm: str = "") -> Trace:
+def trace_of_episode(root: Path, number: int, arm: str = "", wirings: Sequence[Wiring] = ()) -> Trace:
     """Read an episode of a dataset; its task is unknown.
 
     Where the joints were not measured, the arm is shown at the decoded ones. A gripper that is not
     er_il's opening in [0, 1] is shown open.
 
     Args:
-        root: Folder of a LeRobot v3 dataset that says what its actions mean.
+        root: Folder of a LeRobot v3 dataset.
         number: Number of the episode.
         arm: Label of the arm, where there are several.
+        wirings: The arms of a dataset that does not know them; its actions are their joints.
 
     Raises:
         DatasetError: the folder is no such dataset, or has no such episode, or its numbers cannot be.
         UnknownNameError: it has no such arm.
     """
     dataset = Dataset(root)
-    layout = dataset.layout
+    dataset, layout = read_layout(dataset, wirings)
     part = _part(layout, arm)
     if number not in dataset.episodes:
         raise DatasetError(
@@ -67,14 +71,14 @@ def trace_of_episode(root: Path, number: int, arm: str = "") -> Trace:
 
 
 def _part(layout: Layout, label: str) -> Part:
-    """The arm of that label; without one, the only arm."""
-    if not label and len(layout.parts) == 1:
+    """The arm of that label; without one, or by its own name, the only arm."""
+    if len(layout.parts) == 1 and label in ("", layout.parts[0].space.arm.name):
         return layout.parts[0]
     labels = [part.label for part in layout.parts]
     if not label:
         raise DatasetError(f"The dataset has several arms: choose one with --arm. Valid: {', '.join(labels)}.")
     if label not in labels:
-        raise UnknownNameError("arm", label, filter(None, labels))
+        raise UnknownNameError("arm", label, [part.label or part.space.arm.name for part in layout.parts])
     return layout.parts[labels.index(label)]
 
 

@@ -1,6 +1,6 @@
 """Sources of the viewer: the trace of a rollout, or an episode of a dataset, each with the scene around the arm."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,6 +9,7 @@ import gymnasium
 
 from er_il.arms.robot import robot_with
 from er_il.datasets.record import RECORD, DatasetRecord
+from er_il.datasets.wiring import Wiring
 from er_il.envs.protocol import robot_env
 from er_il.envs.tasks import task_id, task_names
 from er_il.evaluation.trace import SUFFIX, Trace
@@ -17,20 +18,23 @@ from er_il.support.shapes import Shape
 from er_il.viewer.episode import trace_of_episode
 
 
-def read_source(source: Path, episode: int | None = None, arm: str = "") -> tuple[Trace, list[Shape]]:
+def read_source(
+    source: Path, episode: int | None = None, arm: str = "", wirings: Sequence[Wiring] = ()
+) -> tuple[Trace, list[Shape]]:
     """Read what is to be viewed, and the world around the arm; there is none unless a simulated task made the data.
 
     Args:
-        source: A trace (``.npz``), or the folder of a dataset that says what its actions mean.
+        source: A trace (``.npz``), or the folder of a dataset.
         episode: Which episode of a dataset; the first if omitted.
         arm: Which arm of a dataset of several.
+        wirings: The arms of a dataset that does not know them.
 
     Raises:
         DatasetError: there is no such trace, dataset, or episode.
         UnknownNameError: the dataset has no such arm.
     """
     if source.is_dir():
-        trace = trace_of_episode(source, episode or 0, arm)
+        trace = trace_of_episode(source, episode or 0, arm, wirings)
         if not (source / RECORD).is_file():
             return trace, []
         recipe = DatasetRecord.read(source).recipe
