@@ -4,18 +4,21 @@ from pathlib import Path
 
 from tyro.conf import Positional
 
+from er_il.cli.arm_options import Names
 from er_il.cli.table import write_study
 
 
-def verify(dataset: Positional[str], *, out: Path | None = None) -> None:
+def verify(dataset: Positional[str], *, poses: Names = (), out: Path | None = None) -> None:
     """Decode a dataset's actions and compare them with the joint values that were encoded.
 
     Prints errors of the round trip, frames that cannot be decoded, and frames near singularities.
     Joint values that look like another arm's, or in another order or other units, are an error. Numbers that cannot
-    be, and frames that do not come back though nothing flags them, end it with exit code 1.
+    be, and frames that do not come back though nothing flags them, end it with exit code 1. Recorded end-effector
+    poses, where there are any, are compared with the joints: their convention, frame and residual are printed.
 
     Args:
         dataset: Folder of the dataset, or its repository id on the hub.
+        poses: Column that holds end-effector poses, then its dimensions if it holds more; found if omitted.
         out: Folder of report.json and round_trip.png; outputs/verify/<dataset> if omitted.
     """
     import sys
@@ -45,7 +48,7 @@ def verify(dataset: Positional[str], *, out: Path | None = None) -> None:
     with make_progress(console) as progress:
         bar = progress.add_task("Verify", total=None)
         verification = verify_dataset(
-            folder, cores(), lambda done, total: progress.update(bar, completed=done, total=total)
+            folder, cores(), lambda done, total: progress.update(bar, completed=done, total=total), poses
         )
     report = {"meta": provenance() | {"dataset": dataset}} | verification.report()
     console.print(f"{report['frames']} frames, {report['episodes']} episodes", highlight=False)
