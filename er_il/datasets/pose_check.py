@@ -15,7 +15,7 @@ from er_il.datasets.pose_columns import PoseColumn
 from er_il.datasets.sanity_checks import Cause
 from er_il.kinematics.frame_fit import LENGTH, SIMPLER, SLACK, FrameFit, fit_frames, inverse
 from er_il.kinematics.pose_codes import CODES, PoseCode
-from er_il.kinematics.solver import kinematics_of
+from er_il.kinematics.forward import forward_of
 from er_il.spaces.motors import UNITS, Motors
 
 Array = NDArray[np.float64]
@@ -70,7 +70,7 @@ class PoseCheck:
     def report(self) -> dict[str, Any]:
         """Everything as JSON."""
         T_recorded_base, T_ee_recorded = self.fit.T_recorded_base, self.fit.T_ee_recorded
-        kinematics = kinematics_of(self.joints.arm)
+        kinematics = forward_of(self.joints.arm)
         return {
             "column": self.place.column,
             "dimensions": list(self.place.names[: self.code.width]),
@@ -162,11 +162,14 @@ def _compared(
     sound = np.isfinite(B).all(axis=(1, 2)) & np.isfinite(q).all(axis=1)
     if not sound.any():
         return None
-    kinematics = kinematics_of(arm)
+    kinematics = forward_of(arm)
     A, B = kinematics.fk_batch(q[sound]), B[sound]
     few = _rows(len(A), rows)
     bases = {name: inverse(T) for name, T in kinematics.rigid_to(arm.base_frame).items()}
-    fit = fit_frames(A[few], B[few], bases, kinematics.rigid_to(arm.ee_frame), refine)
+    ees = kinematics.rigid_to(arm.ee_frame)
+    if not refine:  # other frames leave as little where both are fitted
+        bases, ees = ({name: frames[name]} for name, frames in ((arm.base_frame, bases), (arm.ee_frame, ees)))
+    fit = fit_frames(A[few], B[few], bases, ees, refine)
     return PoseCheck(place, code, joints, fit, *fit.residuals(A, B), cause=cause.text if cause else "")
 
 
