@@ -8,7 +8,7 @@ from er_il import Arm
 from er_il.spaces.pose import PoseSpace
 from er_il.spaces.registry import make_arm_space
 
-STEPS = 30
+STEPS = 20
 
 
 def paths_with_elbows(arm: Arm, swings: Sequence[float]) -> list[np.ndarray]:

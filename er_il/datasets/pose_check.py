@@ -1,4 +1,4 @@
-"""Recorded end-effector poses against forward kinematics: convention, frames, residual, and what mistake explains it."""
+"""Recorded end-effector poses against forward kinematics: convention, frames, residual, and what explains it."""
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
@@ -13,9 +13,9 @@ from er_il.arms.arm import Arm, Vector
 from er_il.arms.presets import PRESETS
 from er_il.datasets.pose_columns import PoseColumn
 from er_il.datasets.sanity_checks import Cause
+from er_il.kinematics.forward import forward_of
 from er_il.kinematics.frame_fit import LENGTH, SIMPLER, SLACK, FrameFit, fit_frames, inverse
 from er_il.kinematics.pose_codes import CODES, PoseCode
-from er_il.kinematics.forward import forward_of
 from er_il.spaces.motors import UNITS, Motors
 
 Array = NDArray[np.float64]
@@ -24,6 +24,7 @@ FITTED, TRIED, REPORTED = 300, 60, 5000  # frames that frames are fitted to, tha
 AGREES = 0.01, np.deg2rad(2.0)  # [m], [rad] 90 % of the measured poses are no farther from those of measured joints
 FOLLOWS = 0.04, np.deg2rad(6.0)  # the same of commanded joints, which the arm follows later
 SAME = 2e-3, np.deg2rad(0.5)  # [m], [rad] frames that are called the same
+CLEAR = 3e-3  # [m] a mistake that leaves less than this explains the poses: no other one is tried
 ZEROS = (90.0, -90.0, 180.0)  # [deg] by which a joint's zero is tried elsewhere
 PERCENTILES = (50, 90, 99, 100)
 
@@ -97,8 +98,8 @@ class PoseCheck:
             return ""
         distance, angle = 1e3 * np.percentile(self.distance, 90), np.rad2deg(np.percentile(self.angle, 90))
         said = (
-            f"The poses in {self.place.label} are not those of {self.joints.arm.name}'s joints: whatever constant frames "
-            f"lie between them, 10 % are off by more than {distance:.0f} mm or {angle:.0f} degrees."
+            f"The poses in {self.place.label} are not those of {self.joints.arm.name}'s joints: whatever constant "
+            f"frames lie between them, 10 % are off by more than {distance:.0f} mm or {angle:.0f} degrees."
         )
         if self.cause:
             return f"{said} They agree with {self.cause}."
@@ -112,7 +113,7 @@ def check_poses(
 
     Args:
         places: Where the poses may be.
-        joints: The arm's joints, measured and commanded, as far as they are known.
+        joints: The arm's joints as commanded, then as measured, as far as they are known.
         others: Joint values (N, n) of other arms by their labels, which may have been mixed up.
     """
     if not places or not joints:
@@ -121,23 +122,34 @@ def check_poses(
     places = [replace(each, values=each.values[rows]) for each in places]
     joints = [replace(each, values=each.values[rows]) for each in joints]
     others = {label: values[rows] for label, values in others.items()}
-    found = [_compared(*each, rows=TRIED) for each in itertools.product(places, CODES, joints)]
-    tried = [each for each in found if each is not None]
-    if not tried:
+    told = _tried([each for each in places if each.told], joints)
+    best = _best(told)
+    if best is None or not best.agrees:  # somewhere else, where names say nothing: only poses that agree count
+        hidden = _best(_tried([each for each in places if not each.told], joints[-1:]))
+        if hidden is not None and hidden.agrees:
+            best = hidden
+        elif best is not None:
+            best = _explained(best, [each for each in told if each.joints is best.joints], others)
+    if best is None:
         return None
-    sizes = [_size(each) / each.joints.tolerance[0] for each in tried]
-    best = next(
-        each for each, size in zip(tried, sizes, strict=True) if size <= SIMPLER * min(sizes) + SLACK / AGREES[0]
-    )
-    if not best.agrees:
-        told = [each for each in tried if each.place.told]
-        if not told:
-            return None
-        best = min(told, key=_size)
-        best = _explained(best, [each for each in told if each.joints is best.joints], others)
     final = _compared(best.place, best.code, best.joints, rows=FITTED, refine=True)
     assert final is not None
     return replace(final, cause=best.cause, untold=_untold(final) if final.agrees else ())
+
+
+def _tried(places: Sequence[PoseColumn], joints: Sequence[JointValues]) -> list[PoseCheck]:
+    """All that can be read as poses."""
+    found = (_compared(*each, rows=TRIED) for each in itertools.product(places, CODES, joints))
+    return [each for each in found if each is not None]
+
+
+def _best(tried: Sequence[PoseCheck]) -> PoseCheck | None:
+    """The first of those that leave about as little as any, as a share of what they may."""
+    if not tried:
+        return None
+    sizes = [_size(each) / each.joints.tolerance[0] for each in tried]
+    most = SIMPLER * min(sizes) + SLACK / AGREES[0]
+    return next(each for each, size in zip(tried, sizes, strict=True) if size <= most)
 
 
 def _compared(
@@ -175,13 +187,12 @@ def _compared(
 
 def _explained(best: PoseCheck, told: Sequence[PoseCheck], others: Mapping[str, Array]) -> PoseCheck:
     """The same with the mistake that explains it best, if one does."""
-    codes = {(each.place, each.code) for each in told}
-    tried = [
-        _compared(place, code, best.joints, TRIED, cause=cause)
-        for cause in _mistakes(best.joints, others)
-        for place, code in sorted(codes, key=lambda each: (each[0].label, CODES.index(each[1])))
-    ]
-    explained = min((each for each in tried if each is not None), key=_size, default=best)
+    explained = best
+    for cause in _mistakes(best.joints, others):
+        tried = [_compared(each.place, each.code, best.joints, TRIED, cause=cause) for each in told]
+        explained = min([explained, *(each for each in tried if each is not None)], key=_size)
+        if _size(explained) <= CLEAR:
+            break
     return explained if explained.agrees else best
 
 

@@ -41,7 +41,7 @@ def named_poses(dataset: Dataset, named: Sequence[str]) -> list[PoseColumn]:
         DatasetError: there are no such columns or dimensions, or no pose has as many numbers.
     """
     column, *dimensions = named
-    if column not in dataset.features:
+    if column not in _numeric(dataset):
         raise UnknownNameError("column", column, _numeric(dataset))
     names = dataset.names(column)
     for dimension in dimensions:
@@ -51,14 +51,17 @@ def named_poses(dataset: Dataset, named: Sequence[str]) -> list[PoseColumn]:
     count = len(dimensions or names)
     if count < LEAST or (dimensions and count not in widths):
         raise DatasetError(
-            f"{count} numbers are no pose: it has {', '.join(map(str, widths))} (position, then angles, rotation vector, "
-            "quaternion, rot6d or matrix)."
+            f"{count} numbers are no pose: it has {', '.join(map(str, widths))} (position, then angles, rotation "
+            "vector, quaternion, rot6d or matrix)."
         )
     values = dataset.vectors(column)
     if dimensions:
         chosen = values[:, [names.index(each) for each in dimensions]]
         return [PoseColumn(column, tuple(dimensions), chosen, told=True, named=True, exact=True)]
-    return [PoseColumn(column, names[start:], values[:, start:], told=True, named=True) for start in range(count - LEAST + 1)]
+    return [
+        PoseColumn(column, names[start:], values[:, start:], told=True, named=True)
+        for start in range(count - LEAST + 1)
+    ]
 
 
 def possible_poses(dataset: Dataset, label: str, others: Sequence[str]) -> Iterator[PoseColumn]:

@@ -161,9 +161,7 @@ def verify(
 
     decoded = decode_episodes(layout, episodes, workers, advance)
     checked = tuple(_check(layout, *each) for each in zip(episodes, decoded, strict=True))
-    return Verification(
-        layout, checked, truth is not None, findings, _other_side(layout, episodes), problems, compared
-    )
+    return Verification(layout, checked, truth is not None, findings, _other_side(layout, episodes), problems, compared)
 
 
 def _check(layout: Layout, episode: EncodedEpisode, decoded: DecodedEpisode) -> CheckedEpisode:
@@ -247,7 +245,8 @@ def _poses(
     for part in layout.parts:
         others = {each.label: layout.indices(each) for each in layout.parts if each is not part}
         joints = [
-            JointValues(part.space.arm, part.motors, each[:, layout.indices(part)], measured) for each, measured in known
+            JointValues(part.space.arm, part.motors, each[:, layout.indices(part)], measured)
+            for each, measured in known
         ]
         mixed = {label: known[-1][0][:, indices] for label, indices in others.items()} if known else {}
         places = list(possible_poses(dataset, part.label, list(others))) if chosen is None else chosen

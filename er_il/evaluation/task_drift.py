@@ -35,8 +35,8 @@ def task_drift(arm: Arm, decoder: str, paths: Sequence[Array]) -> TaskDrift:
 
     Args:
         arm: The arm.
-        decoder: One of ``DECODERS``: the solution nearest the last one; the null space pulled to the arm's home posture,
-            or to the mean of the recorded joints.
+        decoder: One of ``DECODERS``: the solution nearest the last one; the null space pulled to the arm's home
+            posture, or to the mean of the recorded joints.
         paths: Recorded joints, each (T, n) [rad] in time order. The first are where decoding starts.
     """
     postures = {HOME: arm.home, MEAN: np.concatenate(paths).mean(axis=0)}
@@ -46,7 +46,9 @@ def task_drift(arm: Arm, decoder: str, paths: Sequence[Array]) -> TaskDrift:
     met = []
     for t in range(1, max(map(len, paths))):  # all episodes at once, a step after the other
         going = [i for i, path in enumerate(paths) if len(path) > t]
-        found = space.decode_batch(np.array([actions[i][t] for i in going]), np.array([decoded[i][t - 1] for i in going]))
+        found = space.decode_batch(
+            np.array([actions[i][t] for i in going]), np.array([decoded[i][t - 1] for i in going])
+        )
         met += (found.status == Status.OK).tolist()
         for i, q in zip(going, found.q, strict=True):
             decoded[i][t] = q

@@ -74,7 +74,7 @@ class ForwardKinematics:
         return poses
 
     def rigid_to(self, frame: str) -> dict[str, Array]:
-        """Poses ``T_frame_link`` (4, 4) of a link itself, then of all links that no joint of the arm moves against it."""
+        """Poses ``T_frame_link`` (4, 4) of a link itself, then of all that no joint of the arm moves against it."""
         model, data = self._model, self._data
         index = self._frame_id(frame)
         pin.framesForwardKinematics(model, data, np.zeros(model.nq))

@@ -1,7 +1,7 @@
 """The constant frames between recorded end-effector poses B and those of forward kinematics A: B_i = Y A_i X.
 
-X = ``T_ee_recorded`` is what was recorded as end effector, seen from the URDF's; Y = ``T_recorded_base`` the URDF's base
-in the frame that poses were recorded in. (Robot-world and hand-eye calibration, A X = Y B, has Y inverted.)
+X = ``T_ee_recorded`` is what was recorded as end effector, seen from the URDF's; Y = ``T_recorded_base`` the URDF's
+base in the frame that poses were recorded in. (Robot-world and hand-eye calibration, A X = Y B, has Y inverted.)
 
 Not all motions determine both: with rotations about one axis only, X and Y can be traded for one another along it. But
 either follows from the other in closed form. So the simplest hypothesis is taken that explains the poses about as well
@@ -98,7 +98,7 @@ def _left(A: Array, B: Array, X: Array) -> Array:
 
 
 def _both(A: Array, B: Array) -> list[FrameFit]:
-    """Both frames, from several rotations of Y: those that fit the rotations, those that fit the positions, and none."""
+    """Both frames, from several rotations of Y: one that fits the rotations, one that fits the positions, and none."""
     found = []
     for R_Y in _turns(A, B):
         fit = _with_turn(A, B, R_Y)
@@ -112,8 +112,9 @@ def _turns(A: Array, B: Array) -> list[Array]:
     # Shah (2013): the first left singular vector of the sum of kron(R_B, R_A) is R_Y, up to its length and sign.
     K = np.einsum("nij,nkl->ikjl", B[:, :3, :3], A[:, :3, :3]).reshape(9, 9)
     R_Y = np.linalg.svd(K)[0][:, 0].reshape(3, 3)
+    R_Y = R_Y * np.sign(np.linalg.det(R_Y))
     a, b = (T[:, :3, 3] - np.median(T[:, :3, 3], axis=0) for T in (A, B))
-    return [_nearest_rotation(R_Y), _nearest_rotation(-R_Y), _nearest_rotation(b.T @ a), np.eye(3)]
+    return [_nearest_rotation(R_Y), _nearest_rotation(b.T @ a), np.eye(3)]
 
 
 def _with_turn(A: Array, B: Array, R_Y: Array) -> FrameFit:
@@ -122,7 +123,7 @@ def _with_turn(A: Array, B: Array, R_Y: Array) -> FrameFit:
     R_X = _mean_rotation(R.transpose(0, 2, 1) @ B[:, :3, :3])
     # p_B - R_Y p_A = R_Y R_A p_X + p_Y: the shortest solution, where there are many
     columns = np.concatenate([R, np.broadcast_to(np.eye(3), R.shape)], axis=2).reshape(-1, 6)
-    p = np.linalg.lstsq(columns, (B[:, :3, 3] - A[:, :3, 3] @ R_Y.T).ravel(), rcond=SEEN)[0]
+    p = np.asarray(np.linalg.lstsq(columns, (B[:, :3, 3] - A[:, :3, 3] @ R_Y.T).ravel(), rcond=SEEN)[0], np.float64)
     return FrameFit(_transform(R_Y, p[3:]), _transform(R_X, p[:3]), "", "", 0)
 
 

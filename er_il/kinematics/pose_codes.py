@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from er_il.kinematics.rotation import Rot6d
 
 Array = NDArray[np.float64]
+Rows = NDArray[np.bool_]
 
 MILLIMETRES = 5.0  # positions whose median is farther from their origin than this are no metres
 UNIT = 0.05  # by which lengths and products of unit vectors may miss theirs: single precision, interpolation
@@ -27,7 +28,7 @@ class PoseCode:
 
     def decode(self, values: Array) -> Array | None:
         """Poses (N, 4, 4) [m] from numbers (N, width); NaN in rows that are none, None if many are not."""
-        sound = np.isfinite(values).all(axis=1)
+        sound: Rows = np.asarray(np.isfinite(values).all(axis=1))
         T = np.full((len(values), 4, 4), np.nan)
         R, p = self._decode(np.where(sound[:, None], values, 0.0))
         sound &= np.abs(R @ R.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2)) < UNIT
@@ -49,7 +50,7 @@ def _euler(order: str, unit: float = 1.0) -> Callable[[Array], Array]:
     def rotations(angles: Array) -> Array:
         turns = unit * angles
         R = Rotation.from_euler(order, turns).as_matrix()
-        return _only(R, (np.abs(turns) <= TURN).all(axis=1))
+        return _only(R, np.abs(turns).max(axis=1) <= TURN)
 
     return rotations
 
@@ -71,7 +72,7 @@ def _six_numbers(by_rows: bool) -> Callable[[Array], Array]:
     def rotations(values: Array) -> Array:
         lengths = np.linalg.norm(values.reshape(-1, 2, 3), axis=2)
         R = Rot6d().decode_batch(values.T, np)[0].transpose(2, 0, 1)
-        return _only(R.transpose(0, 2, 1) if by_rows else R, (np.abs(lengths - 1.0) < UNIT).all(axis=1))
+        return _only(R.transpose(0, 2, 1) if by_rows else R, np.abs(lengths - 1.0).max(axis=1) < UNIT)
 
     return rotations
 
@@ -89,7 +90,7 @@ def _transforms(by_columns: bool) -> Callable[[Array], tuple[Array, Array]]:
     return parts
 
 
-def _only(R: Array, rows: NDArray[np.bool_]) -> Array:
+def _only(R: Array, rows: Rows) -> Array:
     """The rotations of some rows; zero matrices, which are none, elsewhere."""
     return np.where(rows[:, None, None], R, 0.0)
 
@@ -105,10 +106,11 @@ CODES = (
     PoseCode("rotation vector", 6, _after_position(_rotation_vectors)),
     PoseCode("quaternion x, y, z, w", 7, _after_position(_quaternions([0, 1, 2, 3]))),
     PoseCode("quaternion w, x, y, z", 7, _after_position(_quaternions([1, 2, 3, 0]))),
-    PoseCode("rot6d by columns", 9, _after_position(_six_numbers(by_rows=False))),
-    PoseCode("rot6d by rows", 9, _after_position(_six_numbers(by_rows=True))),
     PoseCode("rotation matrix by rows", 12, _after_position(_matrices(by_columns=False))),
     PoseCode("rotation matrix by columns", 12, _after_position(_matrices(by_columns=True))),
+    # after the matrices, which begin with the same numbers
+    PoseCode("rot6d by columns", 9, _after_position(_six_numbers(by_rows=False))),
+    PoseCode("rot6d by rows", 9, _after_position(_six_numbers(by_rows=True))),
     PoseCode("4 x 4 matrix by rows", 16, _transforms(by_columns=False)),
     PoseCode("4 x 4 matrix by columns", 16, _transforms(by_columns=True)),
 )

@@ -21,6 +21,7 @@ LOOKS_OF = {RECORDED: Look("Recorded", INK), **{name: LOOKS[name] for name in DE
 LOOKS_OF[MEAN] = Look(LOOKS[MEAN].label, BLUE)
 SEPARATED = 60  # episodes at most between which lines are drawn
 
+
 def recommendation(report: Report) -> str:
     """The recommendation in plain words, for the terminal."""
     text = render("audit_recommendation.md.j2", **_values("", report))
@@ -30,7 +31,10 @@ def recommendation(report: Report) -> str:
 def write_page(folder: Path, label: str, report: Report, source: str) -> Path:
     """Write the pictures and the page of one arm, and return the page; all names start with the arm's label, if any."""
     start = f"{label}_" if label else ""
-    for name, draw in {"elbow": elbow_figure, "spread": spread_figure, "folds": folds_figure}.items():
+    pictures = {"elbow": elbow_figure, "folds": folds_figure}
+    if report["spread"]["pairs"]:
+        pictures["spread"] = spread_figure
+    for name, draw in pictures.items():
         save(draw(report), folder / f"{start}{name}.png")
     page = folder / f"{start}README.md"
     page.write_text(render("audit.md.j2", source=source, **_values(start, report)))
@@ -44,7 +48,7 @@ def _values(start: str, report: Report) -> dict[str, Any]:
 
 @styled
 def elbow_figure(report: Report) -> Figure:
-    """The arm where task space is farthest from the recording, from the side and from above; and the drift over time."""
+    """The arm where task space is farthest from the recording, from the side and from above; the drift over time."""
     figure = Figure(figsize=(11.0, 3.9))
     side, above, curves = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 1.5))
     scene, best = report["scene"], report["verdict"]["decoder"]
@@ -77,7 +81,7 @@ def elbow_figure(report: Report) -> Figure:
 
 @styled
 def spread_figure(report: Report) -> Figure:
-    """The spread of the elbow at the same pose beside the room that it has; and each episode's difference from others."""
+    """The spread of the elbow at the same pose beside the room that it has; each episode's difference from others."""
     figure = Figure(figsize=(11.0, 3.4))
     left, right = figure.subplots(1, 2)
     curve = report["spread"]["curve"]
@@ -121,7 +125,9 @@ def folds_figure(report: Report) -> Figure:
     shown = max(1, len(ends) // 20)
     axis.set_xticks(middles[::shown], [str(each["episode"]) for each in report["episodes"]][::shown])
     axis.set_yticks(range(len(rows)), [row["space"] for row in rows])
-    axis.set(xlabel="Episode", title="Margin from folds, step by step: red is at a fold, where two elbows share an action")
+    axis.set(
+        xlabel="Episode", title="Margin from folds, step by step: red is at a fold, where two elbows share an action"
+    )
     axis.grid(visible=False)
     figure.colorbar(picture, ax=axis, extend="max", label="Margin")
     return figure
