@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -57,7 +57,7 @@ class Verification:
     findings: dict[str, str]  # arm -> what is wrong with its joint values
     other_side: dict[str, float]  # arm -> share of quaternions beyond the hemisphere of their reference
     problems: Problems  # numbers that cannot be
-    poses: dict[str, PoseCheck]  # arm -> its recorded end-effector poses against its joints
+    poses: dict[str, PoseCheck] = field(default_factory=dict)  # arm -> its recorded poses against its joints
 
     @property
     def arms(self) -> tuple[str, ...]:
@@ -109,8 +109,9 @@ class Verification:
                 "broken": int(sum(each.broken[:, arm].sum() for each in self.episodes)),
                 "quaternions_other_side": self.other_side.get(label, 0.0),
                 "finding": self.findings.get(label, ""),
-                "poses": self.poses[label].report() if label in self.poses else None,
             }
+            if label in self.poses:
+                arms[label]["poses"] = self.poses[label].report()
         return {
             "frames": sum(len(each.status) for each in self.episodes),
             "episodes": len(self.episodes),
