@@ -16,6 +16,7 @@ from er_il.support.failures import REPORT, explanation
 COMMANDS: dict[str, str] = {
     "advise": "advise",
     "attach": "attach",
+    "audit": "audit",
     "benchmark": "benchmark",
     "circle": "circle",
     "demo": "demo",

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import OmitArgPrefixes, Positional, arg
 
-from er_il.cli.arm_options import ArmOptions
+from er_il.cli.arm_options import ArmOptions, Names
 from er_il.cli.table import write_study
 
 if TYPE_CHECKING:
@@ -20,19 +20,22 @@ def verify(
     *,
     robot: OmitArgPrefixes[ArmOptions],
     episodes: Annotated[tuple[int, ...], arg(metavar="N ...")] = (),
+    poses: Names = (),
     out: Path | None = None,
 ) -> None:
     """Decode a dataset's actions and compare them with the joint values that were encoded.
 
     Prints errors of the round trip, frames that cannot be decoded, and frames near singularities.
     Joint values that look like another arm's, or in another order or other units, are an error. Numbers that cannot
-    be, and frames that do not come back though nothing flags them, end it with exit code 1.
+    be, and frames that do not come back though nothing flags them, end it with exit code 1. Recorded end-effector
+    poses, where there are any, are compared with the joints: their convention, frame and residual are printed.
     A dataset whose actions are joints is encoded in each action space and decoded, in memory.
 
     Args:
         datasets: Folders of datasets, or their repository ids on the hub.
         robot: The arm of a dataset that does not know it, whose actions are then joints.
         episodes: Numbers of the episodes to look at; all if omitted.
+        poses: Column that holds end-effector poses, then its dimensions if it holds more; found if omitted.
         out: Folder of report.json and round_trip.png, of several datasets one folder each in it;
             outputs/verify/<dataset> if omitted.
     """
@@ -55,7 +58,7 @@ def verify(
     console = Console()
     findings, broken = [], False
     for dataset, root, folder in zip(datasets, roots, folders, strict=True):
-        verification = _verify(dataset, root, folder, wirings, episodes, console)
+        verification = _verify(dataset, root, folder, wirings, episodes, poses, console)
         prefix = f"{dataset}: " if len(datasets) > 1 else ""
         found = [f"{prefix}{label}: {text}" for label, text in verification.findings.items()]
         if problems := verification.broken():
@@ -72,7 +75,13 @@ def verify(
 
 
 def _verify(
-    dataset: str, root: Path, folder: Path, wirings: Sequence[Any], episodes: Sequence[int], console: "Console"
+    dataset: str,
+    root: Path,
+    folder: Path,
+    wirings: Sequence[Any],
+    episodes: Sequence[int],
+    poses: Names,
+    console: "Console",
 ) -> "Verification":
     """Verify a dataset and report it."""
     from rich.markup import escape
@@ -89,13 +98,15 @@ def _verify(
 
     with make_progress(console) as progress:
 
-        def check(what: str, function: Any) -> Any:
+        def check(what: str, function: Any, *more: Any) -> Any:
             bar = progress.add_task(what, total=None)
-            return function(
-                root, cores(), lambda done, total: progress.update(bar, completed=done, total=total), wirings, episodes
-            )
 
-        verification = check("Verify", verify_dataset)
+            def shown(done: int, total: int) -> None:
+                progress.update(bar, completed=done, total=total)
+
+            return function(root, cores(), shown, wirings, episodes, *more)
+
+        verification = check("Verify", verify_dataset, poses)
         sound = not (verification.findings or verification.broken())
         in_spaces = check("Try spaces", verify_in_spaces) if verification.layout.kind == JOINT and sound else {}
     report = {"meta": provenance() | {"dataset": dataset}} | verification.report()

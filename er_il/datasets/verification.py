@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,8 @@ from er_il.datasets.decoding import DecodedEpisode, EncodedEpisode, decode_episo
 from er_il.datasets.described import read_layout
 from er_il.datasets.integrity import check_whole
 from er_il.datasets.number_checks import Problems, number_problems
+from er_il.datasets.pose_check import JointValues, PoseCheck, check_poses
+from er_il.datasets.pose_columns import named_poses, possible_poses
 from er_il.datasets.sanity_checks import JointSample, check_joint_values
 from er_il.datasets.schema import STATE
 from er_il.datasets.selection import selected
@@ -58,6 +60,7 @@ class Verification:
     findings: dict[str, str]  # arm -> what is wrong with its joint values
     other_side: dict[str, float]  # arm -> share of quaternions beyond the hemisphere of their reference
     problems: Problems  # numbers that cannot be
+    poses: dict[str, PoseCheck] = field(default_factory=dict)  # arm -> its recorded poses against its joints
 
     @property
     def arms(self) -> tuple[str, ...]:
@@ -110,6 +113,8 @@ class Verification:
                 "quaternions_other_side": self.other_side.get(label, 0.0),
                 "finding": self.findings.get(label, ""),
             }
+            if label in self.poses:
+                arms[label]["poses"] = self.poses[label].report()
         return {
             "frames": sum(len(each.status) for each in self.episodes),
             "episodes": len(self.episodes),
@@ -131,6 +136,7 @@ def verify(
     on_progress: Callable[[int, int], object],
     wirings: Sequence[Wiring] = (),
     chosen: Collection[int] = (),
+    poses: Sequence[str] = (),
 ) -> Verification:
     """Decode a dataset's actions and compare them with the joint vectors that were encoded.
 
@@ -143,9 +149,11 @@ def verify(
         on_progress: Called with the number of frames done, and their total.
         wirings: The arms of a dataset that does not know them; its actions are their joints.
         chosen: Numbers of the episodes to look at; all if empty.
+        poses: Column that holds end-effector poses, then their dimensions in it; found by their names and values if
+            omitted.
 
     Raises:
-        ErIlError: nothing says what its actions mean, it is no dataset, or has no such episode.
+        ErIlError: nothing says what its actions mean, it is no dataset, or has no such episode or column.
     """
     dataset = Dataset(root)
     check_whole(dataset)
@@ -154,7 +162,8 @@ def verify(
     truth = dataset.joints_column(layout)
     episodes = read_encoded_episodes(dataset, layout, truth)
     problems = number_problems(dataset, layout)
-    findings = _findings(dataset, layout, episodes)
+    compared = _poses(dataset, layout, episodes, poses)
+    findings = _findings(dataset, layout, episodes, compared)
     done = 0
 
     def advance(frames: int) -> None:
@@ -164,7 +173,7 @@ def verify(
 
     decoded = decode_episodes(layout, episodes, workers, advance)
     checked = tuple(check_episode(layout, *each) for each in zip(episodes, decoded, strict=True))
-    return Verification(layout, checked, truth is not None, findings, _other_side(layout, episodes), problems)
+    return Verification(layout, checked, truth is not None, findings, _other_side(layout, episodes), problems, compared)
 
 
 def check_episode(layout: Layout, episode: EncodedEpisode, decoded: DecodedEpisode) -> CheckedEpisode:
@@ -217,20 +226,53 @@ def _other_side(layout: Layout, episodes: list[EncodedEpisode]) -> dict[str, flo
     return found
 
 
-def _findings(dataset: Dataset, layout: Layout, episodes: list[EncodedEpisode]) -> dict[str, str]:
+def _findings(
+    dataset: Dataset, layout: Layout, episodes: list[EncodedEpisode], poses: dict[str, PoseCheck]
+) -> dict[str, str]:
     """Check the joint values of each arm, measured ones where an end effector was measured with them."""
-    recorded = None if episodes[0].truth is None else np.concatenate([np.asarray(each.truth) for each in episodes])
-    measured = None if episodes[0].state is None else np.concatenate([np.asarray(each.state) for each in episodes])
+    recorded, measured = _vectors(episodes)
     vectors = recorded if recorded is not None else measured
     if vectors is None:
         return {}
     found = {}
     for part in layout.parts:
+        name = part.label or part.space.arm.name
         positions = None if measured is None else _measured_positions(dataset, part.label)
         values = (vectors if positions is None or measured is None else measured)[:, layout.indices(part)]
-        if text := check_joint_values(JointSample(part.space.arm, part.motors, values, positions)):
-            found[part.label or part.space.arm.name] = text
+        text = check_joint_values(JointSample(part.space.arm, part.motors, values, positions))
+        if name in poses and poses[name].certain and (poses[name].cause or not text):
+            text = poses[name].finding()
+        if text:
+            found[name] = text
     return found
+
+
+def _poses(
+    dataset: Dataset, layout: Layout, episodes: list[EncodedEpisode], named: Sequence[str]
+) -> dict[str, PoseCheck]:
+    """Compare the recorded poses of each arm with its joints, where there are any."""
+    chosen = named_poses(dataset, named) if named else None
+    vectors = zip(_vectors(episodes), (False, True), strict=True)
+    known = [(each, measured) for each, measured in vectors if each is not None]
+    found = {}
+    for part in layout.parts:
+        others = {each.label: layout.indices(each) for each in layout.parts if each is not part}
+        joints = [
+            JointValues(part.space.arm, part.motors, each[:, layout.indices(part)], measured)
+            for each, measured in known
+        ]
+        mixed = {label: known[-1][0][:, indices] for label, indices in others.items()} if known else {}
+        places = list(possible_poses(dataset, part.label, list(others))) if chosen is None else chosen
+        if check := check_poses(places, joints, mixed):
+            found[part.label or part.space.arm.name] = check
+    return found
+
+
+def _vectors(episodes: list[EncodedEpisode]) -> tuple[Array | None, Array | None]:
+    """Joint vectors (N, D) of all episodes that were commanded and measured, as far as they are known."""
+    recorded = None if episodes[0].truth is None else np.concatenate([np.asarray(each.truth) for each in episodes])
+    measured = None if episodes[0].state is None else np.concatenate([np.asarray(each.state) for each in episodes])
+    return recorded, measured
 
 
 def _measured_positions(dataset: Dataset, label: str) -> Array | None:

@@ -73,6 +73,17 @@ class ForwardKinematics:
             poses[rows, :3, :3], poses[rows, :3, 3] = R.transpose(2, 0, 1), p.T
         return poses
 
+    def rigid_to(self, frame: str) -> dict[str, Array]:
+        """Poses ``T_frame_link`` (4, 4) of a link itself, then of all that no joint of the arm moves against it."""
+        model, data = self._model, self._data
+        index = self._frame_id(frame)
+        pin.framesForwardKinematics(model, data, np.zeros(model.nq))
+        found = {frame: np.eye(4)}
+        for other, each in enumerate(model.frames):
+            if each.type == pin.FrameType.BODY and each.parentJoint == model.frames[index].parentJoint:
+                found.setdefault(each.name, data.oMf[index].actInv(data.oMf[other]).homogeneous)
+        return found
+
     def positions(self, q: Array, frames: Sequence[str]) -> list[Components]:
         """Origins of links [m] in the base frame at q (N, n) [rad]: for each its components (N,)."""
         points = np.empty((len(frames), 3, len(q)))

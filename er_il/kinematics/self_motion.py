@@ -1,6 +1,7 @@
 """Self-motion: what a redundant arm can do while its end effector stays, and how well a redundancy sees it."""
 
 from collections.abc import Iterator
+from itertools import islice
 
 import numpy as np
 
@@ -11,6 +12,8 @@ from er_il.kinematics.solver import kinematics_of
 
 CORRECTIONS = 2  # Newton's steps back to the pose after each step along the tangent
 OFF = 1e-3  # [m and rad] a walk that is still so far from the pose has come to the end of what is reachable
+STEP = 0.05  # [rad] of the walk that measures how far self-motion goes
+ROUND = 4 * np.pi  # [rad] self-motion that is longer is walked no farther
 LEAST = 1e-9  # [1] keeps the square of a Jacobian invertible
 
 
@@ -73,6 +76,27 @@ def walk(kinematics: ForwardKinematics, T_base_ee: Array, q: Vector, tangent: Ve
         yield q
         ahead = _projected(kinematics.jacobian(q), tangent)
         tangent = ahead / np.linalg.norm(ahead)
+
+
+def extents(kinematics: ForwardKinematics, q: Vector) -> Vector:
+    """How far (n-6,) [rad] the joints can go along each axis of the self-motion from q (n,) [rad], both ways together.
+
+    The length of the way through the joint angles, within the limits; the whole of it where it closes.
+    """
+    T_base_ee, found = kinematics.fk(q), []
+    ways = iter(tangents(kinematics.jacobian(q)))
+    for ahead, back in zip(ways, ways, strict=True):
+        found.append(STEP * sum(_steps(kinematics, T_base_ee, q, tangent) for tangent in (ahead, back)))
+    return np.array(found)
+
+
+def _steps(kinematics: ForwardKinematics, T_base_ee: Array, q: Vector, tangent: Vector) -> float:
+    """Steps of a walk until it ends; half as many where it comes back to its start, as the other way does, too."""
+    count = 0
+    for count, at in enumerate(islice(walk(kinematics, T_base_ee, q, tangent, STEP), int(ROUND / STEP)), start=1):
+        if count > 2 and np.linalg.norm(at - q) < STEP:
+            return count / 2
+    return count
 
 
 def _projected(J: Array, change: Vector) -> Vector:

@@ -4,8 +4,11 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 import pandas as pd
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from er_il.evaluation.results import REFERENCE
 from er_il.evaluation.statistics import exact_interval
@@ -31,7 +34,18 @@ _ENVIRONMENT.filters |= {
     "code": lambda names: ", ".join(f"`{name}`" for name in names),
     "markdown_table": lambda rows: markdown_table(read_rows(rows)),
     "tally": tally,
+    "offset": lambda T: offset_text(np.asarray(T)),
 }
+
+
+def offset_text(T: NDArray[np.float64]) -> str:
+    """A transform (4, 4) as a translation in mm and a rotation by its axis and angle."""
+    x, y, z = 1e3 * T[:3, 3]
+    turn = Rotation.from_matrix(T[:3, :3]).as_rotvec(degrees=True)
+    angle = float(np.linalg.norm(turn))
+    axis = turn / angle if angle > 0.05 else turn
+    about = f", {angle:.1f} degrees about ({axis[0]:.2f} {axis[1]:.2f} {axis[2]:.2f})" if angle > 0.05 else ""
+    return f"{x:.1f} {y:.1f} {z:.1f} mm{about}"
 
 
 def render(template: str, **values: object) -> str:
