@@ -24,6 +24,7 @@ COMMANDS: dict[str, str] = {
     "eval": "eval",
     "generate": "generate",
     "replay": "replay",
+    "rl": "rl",
     "study": "study",
     "train": "train",
     "verify": "verify",

@@ -4,13 +4,14 @@ In every mode a decision takes the same simulated time, and deltas count from th
 cannot do is invalid: the arm holds, and the step earns nothing.
 """
 
+from collections.abc import Mapping
 from typing import Any
 
 import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from er_il.control.commander import BEST_EFFORT, HOLD
+from er_il.control.commander import BEST_EFFORT, HOLD, Tally
 from er_il.envs.learning_state import LearningState
 from er_il.envs.protocol import BEYOND_SUCCESS, learnable_env
 from er_il.envs.tasks import task_id, task_names
@@ -105,7 +106,8 @@ class LearningEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         assert isinstance(space, DeltaSpace)
         self._invalid = {Status.INVALID} if mode == JOINT else set(Status) - {Status.OK}
         self._env = ActionSpaceEnv(world, space, BEST_EFFORT if mode == JOINT else HOLD)
-        self._scale = space.limits
+        self.space, self._scale = space, space.limits
+        self.seen: Mapping[str, Any] = {}  # what the world, joint-level, was last observed to be
         self._names = (*space.names, "gripper")
         self._state = LearningState(self.world, objects=not pixels)
         self.render_mode = render_mode
@@ -128,6 +130,11 @@ class LearningEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         """Names of an action's dimensions."""
         return self._names
 
+    @property
+    def tally(self) -> Tally:
+        """Counts of the episode's decoded actions."""
+        return self._env.tally
+
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Start an episode; for the options see the task."""
         super().reset(seed=seed)
@@ -141,9 +148,7 @@ class LearningEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         Raises:
             ValueError: what came is no vector of the mode's dimensions, or no episode was started.
         """
-        given = np.clip(named_vector("The action", action, self._names), -1.0, 1.0)
-        change = np.append(given[:-1] * self._scale, given[-1] > 0.0)
-        observation, reward, terminated, truncated, info = self._env.step(change)
+        observation, reward, terminated, truncated, info = self._env.step(self.change(action))
         invalid = Status(info["decode_status"]) in self._invalid
         failed = terminated and bool(info["failure"])
         self._invalids = self._invalids + 1 if invalid else 0
@@ -154,6 +159,15 @@ class LearningEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         earned = 0.0 if invalid or failed else reward
         return self._observe(observation), earned, failed, truncated and not failed, info
 
+    def change(self, action: NDArray[np.float32]) -> NDArray[np.float64]:
+        """What an action (dim,) in [-1, 1] asks for: the change in its space's units [m, rad], and the gripper's opening.
+
+        Raises:
+            ValueError: what came is no vector of the mode's dimensions.
+        """
+        given = np.clip(named_vector("The action", action, self._names), -1.0, 1.0)
+        return np.append(given[:-1] * self._scale, given[-1] > 0.0)
+
     def render(self) -> Any:
         """A picture (H, W, 3) uint8 of the scene for people."""
         return self._env.render()
@@ -163,6 +177,7 @@ class LearningEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         self._env.close()
 
     def _observe(self, observation: dict[str, Any]) -> Any:
+        self.seen = observation
         state = self._state.observe(observation, self._env.last_command)
         return {**observation[PIXELS], STATE: state} if self._pixels else state
 

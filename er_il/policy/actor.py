@@ -61,7 +61,7 @@ def one_thread() -> Iterator[None]:
 
 
 @contextmanager
-def _loading(policy: Path) -> Iterator[None]:
+def loading(policy: Path) -> Iterator[None]:
     """Tell by the policy's folder what loading its files raises, which is all kinds of errors of LeRobot and torch."""
     try:
         yield
@@ -72,7 +72,7 @@ def _loading(policy: Path) -> Iterator[None]:
         raise PolicyError(f"LeRobot cannot load the policy {policy} ({type(error).__name__}): {said}") from error
 
 
-def _check_weights(policy: PreTrainedPolicy, path: Path) -> None:
+def check_weights(policy: PreTrainedPolicy, path: Path) -> None:
     """Raise a RuntimeError where the file of the weights is not of this policy: LeRobot leaves what it lacks random."""
     own = type(policy)
     loads_as_others = own.from_pretrained.__func__ is PreTrainedPolicy.from_pretrained.__func__
@@ -81,7 +81,7 @@ def _check_weights(policy: PreTrainedPolicy, path: Path) -> None:
 
 
 def _load_config(policy: Path) -> PreTrainedConfig:
-    with _loading(policy):
+    with loading(policy):
         config = PreTrainedConfig.from_pretrained(policy)
     config.pretrained_path = policy
     if hasattr(config, "pretrained_backbone_weights"):
@@ -105,12 +105,12 @@ class Actor:
             raise PolicyError(
                 f"The policy {path} does not act in {config.action_space} space: its actions differ in length."
             )
-        with _loading(path), redirect_stdout(io.StringIO()):  # LeRobot announces every file it loads
+        with loading(path), redirect_stdout(io.StringIO()):  # LeRobot announces every file it loads
             policy = make_policy(policy_config, env_cfg=config)
-            _check_weights(policy, path)
+            check_weights(policy, path)
         policy.eval()
         overrides = {"device_processor": {"device": str(policy.config.device)}}
-        with _loading(path):
+        with loading(path):
             preprocess, postprocess = make_pre_post_processors(
                 policy_config, pretrained_path=str(path), preprocessor_overrides=overrides
             )
