@@ -101,7 +101,7 @@ class LearningEnv(gymnasium.Env[Any, NDArray[np.float32]]):
             **cameras,
             **settings,
         )
-        self.world = learnable_env(world)
+        self.world, self.task = learnable_env(world), task
         space = make_arm_space(name, self.world.arm, bounds=BOUNDS)
         assert isinstance(space, DeltaSpace)
         self._invalid = {Status.INVALID} if mode == JOINT else set(Status) - {Status.OK}
@@ -129,6 +129,11 @@ class LearningEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     def action_names(self) -> tuple[str, ...]:
         """Names of an action's dimensions."""
         return self._names
+
+    @property
+    def most_decisions(self) -> int:
+        """Bound of an episode's decisions."""
+        return self._env.get_wrapper_attr("_max_episode_steps")  # of the registration: as many as at 20 Hz
 
     @property
     def tally(self) -> Tally:

@@ -5,10 +5,11 @@ from dataclasses import dataclass, field
 from lerobot.configs import FeatureType, NormalizationMode, PreTrainedConfig
 from lerobot.utils.constants import ACTION, OBS_STATE
 
+from er_il.rl.modes import AGENT
 from er_il.support.errors import PolicyError
 
 
-@PreTrainedConfig.register_subclass("er_il_agent")
+@PreTrainedConfig.register_subclass(AGENT)
 @dataclass
 class AgentConfig(PreTrainedConfig):
     """What an agent was trained for, and the size of its networks.

@@ -14,7 +14,7 @@ from er_il.envs.learning import STATE
 from er_il.rl.configuration_agent import AgentConfig
 from er_il.rl.controller import GOAL_NAMES, ControllerView
 from er_il.rl.learner import make_actor
-from er_il.rl.modes import has_controller
+from er_il.rl.modes import AGENT, has_controller
 from er_il.support.errors import PolicyError
 
 _IMAGES = f"{OBS_IMAGES}."
@@ -24,7 +24,7 @@ class AgentPolicy(PreTrainedPolicy):
     """Acts by the means of what its networks would draw; through the controller, if it has one (JAiLeR)."""
 
     config_class = AgentConfig  # pyright: ignore[reportAssignmentType]
-    name = "er_il_agent"  # pyright: ignore[reportAssignmentType]
+    name = AGENT  # pyright: ignore[reportAssignmentType]
 
     def __init__(self, config: AgentConfig, **_: Any) -> None:
         """Make the networks, untrained.

@@ -5,6 +5,7 @@ from er_il.spaces.joint import JOINT
 from er_il.spaces.registry import AT
 from er_il.support.errors import UnknownNameError
 
+AGENT = "er_il_agent"  # type of the policies that agents are to LeRobot
 JAILER, JAILER_REWARDED = "jailer", "jailer-rew"
 AGENT_MODES = (*MODES, JAILER, JAILER_REWARDED)
 
