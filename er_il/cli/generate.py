@@ -55,11 +55,11 @@ def generate(
     asked = _split(spaces) or ()
     file = read_weights(weights, asked)
     rows = file.of(robot_arms(recipe.arm)) if file else {}
-    from er_il.datasets.demos import Leader
+    from er_il.datasets.demos import LEADER
     from er_il.datasets.recording import generate as generate_datasets
     from er_il.support.counts import tally
 
-    demonstrator = Leader()
+    demonstrator = LEADER
     if agent is not None:
         from er_il.rl.demonstrator import AgentDemonstrator
 

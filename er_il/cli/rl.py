@@ -17,12 +17,12 @@ def train(
     config: Path | None = None,
     out: Path | None = None,
 ) -> None:
-    """Train an agent by SAC; interrupted, the same command resumes from the last checkpoint, with more steps it goes on.
+    """Train an agent by SAC. Interrupted, the same command resumes from the last checkpoint, and goes on with more steps.
 
     Args:
         task: Task, such as reach_elbow_pose.
-        mode: Action mode: joint, task, erj, era, erx, erj-free, erx-free, jailer, jailer-rew; erj@JOINT commands another
-            joint.
+        mode: Action mode: joint, task, erj, era, erx, erj-free, erx-free, jailer, jailer-rew; erj@JOINT commands
+            another joint.
         steps: Decisions to learn from.
         seed: Seed of the training.
         arm: Arm that does the task: panda, or panda8 with eight joints.
@@ -92,8 +92,8 @@ def evaluate(
         raise ErIlError("Ask for at least one episode, and for no fewer films than none.")
     pretrained(agent)  # seconds of imports follow: mistakes are told before
     from er_il.cli.progress import make_progress
-    from er_il.rl.loading import load_agent
     from er_il.rl.assessment import assess
+    from er_il.rl.loading import load_agent
 
     console = Console()
     policy = load_agent(agent)

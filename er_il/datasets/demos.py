@@ -129,8 +129,11 @@ class Leader:
         return partial(record_demo, make_world(recipe), disturbance=recipe.disturbance)
 
 
+LEADER = Leader()
+
+
 def collect(
-    recipe: Recipe, folder: Path, workers: int, demonstrator: Demonstrator = Leader()
+    recipe: Recipe, folder: Path, workers: int, demonstrator: Demonstrator = LEADER
 ) -> Iterator[tuple[int, str]]:
     """Record demos in worker processes until the recipe has its episodes.
 
@@ -161,9 +164,10 @@ def collect(
             else:
                 kept += 1
             if dropped.total() >= kept + HOPELESS:
+                who = f"the agent {recipe.agent}" if recipe.agent else "the leader"
                 raise DatasetError(
                     f"{dropped.total()} of the first {kept + dropped.total()} demos failed ({tally(dropped)}): "
-                    f"{recipe.agent or 'the leader'} cannot do {recipe.task} like this. Look at the recipe's randomisation."
+                    f"{who} cannot do {recipe.task} like this. Look at the recipe's randomisation."
                 )
             yield seed, reason
 

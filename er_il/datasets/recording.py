@@ -15,7 +15,7 @@ from rich.progress import Progress
 from er_il.arms.arm import Weights
 from er_il.arms.robot import robot_arms
 from er_il.datasets.dataset import Dataset, datasets_in
-from er_il.datasets.demos import Demo, Demonstrator, Leader, collect, demo_path, make_world
+from er_il.datasets.demos import LEADER, Demo, Demonstrator, collect, demo_path, make_world
 from er_il.datasets.recipe import Recipe
 from er_il.datasets.record import DatasetRecord
 from er_il.kinematics.linear_coordinates import SPEC_KEY
@@ -43,7 +43,7 @@ def generate(
     progress: Progress,
     workers: int,
     weights: Mapping[str, Weights] = MappingProxyType({}),
-    demonstrator: Demonstrator = Leader(),
+    demonstrator: Demonstrator = LEADER,
 ) -> Generated:
     """Record a recipe's demos and write one dataset a space into ``out``.
 

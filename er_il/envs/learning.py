@@ -165,7 +165,7 @@ class LearningEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         return self._observe(observation), earned, failed, truncated and not failed, info
 
     def change(self, action: NDArray[np.float32]) -> NDArray[np.float64]:
-        """What an action (dim,) in [-1, 1] asks for: the change in its space's units [m, rad], and the gripper's opening.
+        """What an action (dim,) in [-1, 1] asks for: the change in the space's units, and the gripper's opening.
 
         Raises:
             ValueError: what came is no vector of the mode's dimensions.

@@ -24,6 +24,7 @@ CHECKPOINTS, LAST = "checkpoints", "last"
 POLICY, STATE = "pretrained_model", "training_state"  # in a checkpoint, named as LeRobot names them
 _PROGRESS = "progress.json"
 _SIZES = ("pos", "full")
+_DAMAGES = (OSError, RuntimeError, KeyError, ValueError, TypeError, EOFError, BadZipFile, pickle.UnpicklingError)
 _FLAGS = ("actions", "rewards", "dones", "timeouts")
 
 
@@ -40,7 +41,7 @@ def save_state(folder: Path, learners: Mapping[str, SAC], progress: Mapping[str,
         torch.save(_tensors(learner), folder / f"{name}.pt")
         with (folder / f"{name}.npz").open("wb") as file:
             np.savez(file, allow_pickle=False, **_transitions(learner.replay_buffer))
-    generators = {"numpy": np.random.get_state(legacy=False)}  # SAC draws batches from it
+    generators = {"numpy": np.random.get_state(legacy=False)}  # noqa: NPY002  SAC draws batches from it
     generators |= {name: learner.action_space.np_random.bit_generator.state for name, learner in learners.items()}
     torch.save({"torch": torch.get_rng_state()}, folder / "random.pt")
     counts = {name: {"timesteps": each.num_timesteps, "updates": each._n_updates} for name, each in learners.items()}
@@ -64,11 +65,12 @@ def load_state(folder: Path, learners: Mapping[str, SAC]) -> dict[str, Any]:
             learner._n_updates = state["counts"][name]["updates"]
             learner.action_space.np_random.bit_generator.state = state["generators"][name]
         torch.set_rng_state(torch.load(folder / "random.pt", weights_only=True)["torch"])
-        np.random.set_state(state["generators"]["numpy"])
+        np.random.set_state(state["generators"]["numpy"])  # noqa: NPY002
     except PolicyError:
         raise
-    except (OSError, RuntimeError, KeyError, ValueError, TypeError, EOFError, BadZipFile, pickle.UnpicklingError) as error:
-        raise PolicyError(f"The checkpoint {folder} is damaged: {error}. Delete its training, or choose another --out.") from error
+    except _DAMAGES as error:
+        said = " ".join(str(error).split())
+        raise PolicyError(f"The checkpoint {folder} is damaged: {said}. Delete it, or choose another --out.") from error
     return state["progress"]
 
 
@@ -102,7 +104,10 @@ def _arrays(buffer: ReplayBuffer) -> Iterator[tuple[str, Any]]:
     """The arrays of a buffer by name; those of a Dict observation by its keys."""
     for name in ("observations", "next_observations"):
         found = getattr(buffer, name)
-        yield from ((f"{name}.{key}", each) for key, each in found.items()) if isinstance(found, dict) else [(name, found)]
+        if isinstance(found, dict):
+            yield from ((f"{name}.{key}", each) for key, each in found.items())
+        else:
+            yield name, found
     yield from ((name, getattr(buffer, name)) for name in _FLAGS)
 
 

@@ -1,4 +1,4 @@
-"""JAiLeR's view of the arm (Kumar et al. 2021, paper V-A): a goal of the end effector, and a controller that goes there.
+"""JAiLeR's view of the arm (Kumar et al. 2021, paper V-A): a goal of the hand, and a controller that goes there.
 
 A task policy says how the hand's pose is to change, in shares of the paper's largest changes; the goal counts from the
 pose measured. A controller sees the arm and what is left to the goal, and changes the joints.
@@ -31,7 +31,7 @@ class ControllerView:
 
     @property
     def columns(self) -> list[int]:
-        """Where the state holds joint angles, joint velocities, and what the arm still has to go to its last command."""
+        """Where the state holds joint angles, joint velocities, and what is left to the last command."""
         return [i for ending in (".pos", ".vel", ".left") for i in self._of(ending)]
 
     @property
@@ -75,4 +75,3 @@ class ControllerView:
 
     def _of(self, ending: str) -> list[int]:
         return [i for i, name in enumerate(self.names) if name.endswith(ending)]
-

@@ -77,9 +77,9 @@ class Jailer(VecEnvWrapper):
         if self._rewarded:
             earned += TASK_SHARE * rewards
         left = self._view.shares(self._view.errors(reached, self._goals))
-        self._waiting = _Transitions(
-            self._seen, self._chosen, earned * self._settings.reward_scale, dones, infos, self._view.observe(reached, left)
-        )
+        earned *= self._settings.reward_scale
+        afterwards = self._view.observe(reached, left)
+        self._waiting = _Transitions(self._seen, self._chosen, earned, dones, infos, afterwards)
         self.controller.num_timesteps += self.num_envs
         self._states = states
         return observations, rewards, dones, infos

@@ -6,7 +6,7 @@ import gymnasium
 import numpy as np
 import torch
 from lerobot.policies import PreTrainedPolicy
-from lerobot.utils.constants import ACTION, OBS_IMAGES, OBS_STATE
+from lerobot.utils.constants import OBS_IMAGES, OBS_STATE
 from stable_baselines3.sac.policies import Actor
 from torch import Tensor
 
@@ -40,8 +40,11 @@ class AgentPolicy(PreTrainedPolicy):
         config.validate_features()
         assert config.input_features is not None
         state = _vector(len(config.state_names))
-        pictures = {key: feature.shape for key, feature in config.input_features.items() if key.startswith(_IMAGES)}
-        images = {name.removeprefix(_IMAGES): gymnasium.spaces.Box(0, 255, shape, np.uint8) for name, shape in pictures.items()}
+        images = {
+            key.removeprefix(_IMAGES): gymnasium.spaces.Box(0, 255, feature.shape, np.uint8)
+            for key, feature in config.input_features.items()
+            if key.startswith(_IMAGES)
+        }
         self.cameras = tuple(images)
         observations = gymnasium.spaces.Dict({**images, STATE: state}) if images else state
         self._view = ControllerView(tuple(config.state_names)) if has_controller(config.mode) else None

@@ -16,7 +16,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecEnvWrapper,
 from er_il.envs.learning import LearningEnv, make_rl_env
 from er_il.evaluation.rollout import FIRST_SEED, Rollout
 from er_il.policy.actor import one_thread
-from er_il.rl.checkpoint import STATE, POLICY, last_checkpoint, load_state, save_state, write_checkpoint
+from er_il.rl.checkpoint import POLICY, STATE, last_checkpoint, load_state, save_state, write_checkpoint
 from er_il.rl.evaluation import roll_out
 from er_il.rl.export import make_policy, save_policy
 from er_il.rl.jailer import Jailer
