@@ -17,7 +17,7 @@ def train(
     config: Path | None = None,
     out: Path | None = None,
 ) -> None:
-    """Train an agent by SAC. Interrupted, the same command resumes from the last checkpoint, and goes on with more steps.
+    """Train an agent by SAC. Interrupted, or asked for more steps, the same command goes on from the last checkpoint.
 
     Args:
         task: Task, such as reach_elbow_pose.

@@ -164,7 +164,7 @@ class LearningEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         earned = 0.0 if invalid or failed else reward
         return self._observe(observation), earned, failed, truncated and not failed, info
 
-    def change(self, action: NDArray[np.float32]) -> NDArray[np.float64]:
+    def change(self, action: NDArray[np.float32]) -> NDArray[Any]:
         """What an action (dim,) in [-1, 1] asks for: the change in the space's units, and the gripper's opening.
 
         Raises:

@@ -67,11 +67,10 @@ class ControllerView:
 
     def _hand(self, states: Floats) -> tuple[Array, Rotation]:
         """Measured positions (N, 3) [m] and orientations of the hand."""
-        states = states.astype(np.float64)
         first = self.names.index("ee.x")
-        turn = states[:, first + 3 : first + 3 + len(TURN_NAMES)]
-        x, y = turn[:, :3], turn[:, 3:]
-        return states[:, first : first + 3], Rotation.from_matrix(np.stack([x, y, np.cross(x, y)], axis=2))
+        hand = states[:, first : first + 3 + len(TURN_NAMES)].astype(np.float64)
+        x, y = hand[:, 3:6], hand[:, 6:]
+        return hand[:, :3], Rotation.from_matrix(np.stack([x, y, np.cross(x, y)], axis=2))
 
     def _of(self, ending: str) -> list[int]:
         return [i for i, name in enumerate(self.names) if name.endswith(ending)]

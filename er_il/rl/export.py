@@ -26,14 +26,23 @@ def make_policy(env: LearningEnv, training: "AgentTraining", learners: Mapping[s
         learners: The agent (``task``) and, of JAiLeR, its ``controller``.
     """
     agent = learners["task"]
+    policy = AgentPolicy(agent_config(training, env, str(agent.device)))
+    policy.actor.load_state_dict(agent.actor.state_dict())
+    if policy.controller is not None:
+        policy.controller.load_state_dict(learners["controller"].actor.state_dict())
+    return policy.to(agent.device).eval()
+
+
+def agent_config(training: "AgentTraining", env: LearningEnv, device: str) -> AgentConfig:
+    """The configuration of a training's agent, from an environment of it."""
     inputs = {OBS_STATE: PolicyFeature(FeatureType.STATE, (len(env.observation_names),))}
     if training.pixels:
         image = PolicyFeature(FeatureType.VISUAL, (3, IMAGE_SIZE, IMAGE_SIZE))
         inputs |= {f"{OBS_IMAGES}.{camera}": image for camera in CAMERAS}
-    config = AgentConfig(
+    return AgentConfig(
         input_features=inputs,
         output_features={ACTION: PolicyFeature(FeatureType.ACTION, (len(env.action_names),))},
-        device=str(agent.device),
+        device=device,
         push_to_hub=False,
         task=training.task,
         mode=training.mode,
@@ -42,11 +51,6 @@ def make_policy(env: LearningEnv, training: "AgentTraining", learners: Mapping[s
         state_names=list(env.observation_names),
         action_names=list(env.action_names),
     )
-    policy = AgentPolicy(config)
-    policy.actor.load_state_dict(agent.actor.state_dict())
-    if policy.controller is not None:
-        policy.controller.load_state_dict(learners["controller"].actor.state_dict())
-    return policy.to(agent.device).eval()
 
 
 def save_policy(policy: AgentPolicy, folder: Path) -> None:

@@ -64,9 +64,12 @@ class LearningEnvConfig(EnvConfig):
         if policy := parser.get_path_arg("policy"):
             self._check(policy)
         factories = [freeze_after_episode_end(self._maker)] * n_envs
-        kind = ProcessesEnv if use_async_envs and n_envs > 1 else SideBySideEnv
-        context = {"context": "forkserver"} if kind is ProcessesEnv else {}  # OpenGL contexts do not survive a fork
-        return {self.type: {0: kind(factories, autoreset_mode=AutoresetMode.NEXT_STEP, **context)}}
+        vector: VectorEnv
+        if use_async_envs and n_envs > 1:  # OpenGL contexts do not survive a fork
+            vector = ProcessesEnv(factories, context="forkserver", autoreset_mode=AutoresetMode.NEXT_STEP)
+        else:
+            vector = SideBySideEnv(factories, autoreset_mode=AutoresetMode.NEXT_STEP)
+        return {self.type: {0: vector}}
 
     def _check(self, policy: str) -> None:
         """Refuse an agent that learnt in another mode, or with another arm."""

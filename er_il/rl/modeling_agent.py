@@ -37,6 +37,7 @@ class AgentPolicy(PreTrainedPolicy):
             PolicyError: inputs and outputs are not those of an agent.
         """
         super().__init__(config)
+        self.config: AgentConfig = config
         config.validate_features()
         assert config.input_features is not None
         state = _vector(len(config.state_names))
