@@ -21,6 +21,7 @@ from er_il.rl.evaluation import roll_out
 from er_il.rl.export import make_policy, save_policy
 from er_il.rl.jailer import Jailer
 from er_il.rl.learner import make_sac
+from er_il.rl.milestones import Milestone, read_milestones, write_milestones
 from er_il.rl.modes import JAILER_REWARDED, has_controller, mode_of_environment
 from er_il.rl.settings import Settings
 from er_il.support.atomic_files import work_folder, write_json
@@ -28,20 +29,10 @@ from er_il.support.errors import PolicyError
 from er_il.support.json_files import read_json
 from er_il.support.provenance import provenance
 
-TRAINING, LEARNING = "training.json", "learning.json"  # what was asked for; evaluations along the way
+TRAINING = "training.json"  # what was asked for
 TENSORBOARD = "tensorboard"
 _SEEDS = 100_000_000  # of starts to learn from: above those of demonstrations and evaluations
 _SEEDS_PER_TRAINING, _SEEDS_PER_START = 100_000, 100
-
-
-@dataclass(frozen=True)
-class Milestone:
-    """An evaluation on the way."""
-
-    steps: int  # decisions learnt from
-    successes: int
-    episodes: int
-    invalid_rate: float  # of the decisions since the last milestone, which explore
 
 
 @dataclass(frozen=True)
@@ -83,10 +74,10 @@ class AgentTraining:
             stack.enter_context(closing(envs))
             return _Run(self, probe, envs, advance).learn()
 
-    def make_env(self) -> LearningEnv:
-        """An environment to learn in, or to be evaluated in."""
+    def make_env(self, **more: Any) -> LearningEnv:
+        """An environment to learn in, or to be evaluated in; with more settings if wanted (:class:`LearningEnv`)."""
         mode = mode_of_environment(self.mode)
-        return make_rl_env(self.task, mode, pixels=self.pixels, arm=self.arm, **self.environment)
+        return make_rl_env(self.task, mode, pixels=self.pixels, arm=self.arm, **self.environment, **more)
 
     @property
     def finished(self) -> bool:
@@ -96,15 +87,8 @@ class AgentTraining:
 
     @property
     def milestones(self) -> list[Milestone]:
-        """The evaluations up to the last checkpoint.
-
-        Raises:
-            PolicyError: the file is damaged.
-        """
-        try:
-            return [Milestone(**each) for each in read_json(self.out / LEARNING, PolicyError)["milestones"]]
-        except (KeyError, TypeError) as error:
-            raise PolicyError(f"{self.out / LEARNING} is damaged: it holds no evaluations.") from error
+        """The evaluations up to the last checkpoint (:func:`er_il.rl.milestones.read_milestones`)."""
+        return read_milestones(self.out)
 
     @cached_property
     def _asked(self) -> dict[str, Any]:
@@ -201,7 +185,7 @@ class _Run(BaseCallback):
             save_policy(policy, folder / POLICY)
 
         write_checkpoint(training.out, steps, write)
-        write_json(training.out / LEARNING, progress)
+        write_milestones(training.out, self._milestones)
         self._tell()
 
     def _keep(self, done: list[Rollout], steps: int) -> None:
