@@ -12,7 +12,7 @@ from lerobot.envs.utils import freeze_after_episode_end
 from lerobot.utils.constants import ACTION, OBS_IMAGES, OBS_STATE
 
 from er_il.envs.contract import read_policy_config
-from er_il.envs.learning import CAMERAS, IMAGE_SIZE, PIXELS, RATE, STATE, LearningEnv, make_rl_env
+from er_il.envs.learning import CAMERAS, DECISIONS, IMAGE_SIZE, PIXELS, RATE, STATE, LearningEnv, make_rl_env
 from er_il.envs.side_by_side import ProcessesEnv, SideBySideEnv
 from er_il.rl.modes import mode_of_environment
 from er_il.support.errors import PolicyError
@@ -85,7 +85,7 @@ class LeRobotObservations(gymnasium.ObservationWrapper[Any, Any, Any]):
     def __init__(self, env: LearningEnv) -> None:
         super().__init__(env)
         self.task_description, self.task = env.world.task_description, env.task
-        self._max_episode_steps = env.most_decisions  # LeRobot asks for it
+        self._max_episode_steps = DECISIONS  # LeRobot asks for it
         space = env.observation_space
         self.observation_space = gymnasium.spaces.Dict(
             {
