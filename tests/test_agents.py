@@ -75,7 +75,7 @@ def test_equal_trainings_give_equal_agents_and_another_seed_another_one(trained:
     assert any(not torch.equal(value, weights(other)[key]) for key, value in weights(trained).items())
 
 
-def test_an_interrupted_training_goes_on_from_its_checkpoint(tmp_path: Path) -> None:
+def test_an_interrupted_training_goes_on_from_its_checkpoint(trained: AgentTraining, tmp_path: Path) -> None:
     whole = training(tmp_path / "agent")
     seen: list[int] = []
 
@@ -90,6 +90,8 @@ def test_an_interrupted_training_goes_on_from_its_checkpoint(tmp_path: Path) -> 
     seen.clear()
     assert [each.steps for each in whole.run(lambda steps, _: seen.append(steps))] == [64, 128]
     assert seen[0] == 66  # what was learnt before the checkpoint is not learnt again
+    assert whole.milestones == trained.milestones  # as if nothing had happened
+    assert all(torch.equal(value, weights(whole)[key]) for key, value in weights(trained).items())
     assert whole.run() == whole.milestones  # done: nothing is left to do
     assert [each.steps for each in replace(whole, steps=130).run()] == [64, 128, 130]
 

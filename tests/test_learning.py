@@ -213,7 +213,7 @@ def test_the_papers_pace_waits_until_the_arm_has_settled(mode: str, longest: flo
     taken = data.time - start
     assert 0.05 - 1e-6 <= taken <= longest + 1e-6
     if mode == "joint":
-        assert taken == pytest.approx(0.05)
+        assert taken == pytest.approx(0.05, abs=0.003)  # whole steps of physics
     else:
         assert taken > 0.1 and np.abs(info["command"] - env.world.joint_positions).max() < 0.02
 

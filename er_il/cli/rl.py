@@ -15,6 +15,7 @@ def train(
     arm: str = "panda",
     pixels: bool = False,
     config: Path | None = None,
+    film: bool = True,
     out: Path | None = None,
 ) -> None:
     """Train an agent by SAC. Interrupted, or asked for more steps, the same command goes on from the last checkpoint.
@@ -28,6 +29,7 @@ def train(
         arm: Arm that does the task: panda, or panda8 with eight joints.
         pixels: Observe the cameras wrist and front instead of the objects' places.
         config: Settings of SAC; configs/sac.yaml if omitted, with pixels configs/sac_pixels.yaml.
+        film: Film the trained agent once, from the first of the starts that it is evaluated on.
         out: Folder of the agent; policies/<task>/rl_<mode> if omitted.
     """
     from rich.console import Console
@@ -59,11 +61,17 @@ def train(
         )
     last = milestones[-1]
     console.print(
-        f"Success {last.successes}/{last.episodes} after {last.steps:,} decisions; invalid actions while learning: "
-        f"{last.invalid_rate:.1%}\n{folder}",
+        f"{folder}: success {last.successes}/{last.episodes} after {last.steps:,} decisions",
         highlight=False,
         soft_wrap=True,
     )
+    if film:
+        from er_il.evaluation.rollout import FIRST_SEED
+        from er_il.rl.assessment import film as film_episodes
+        from er_il.rl.loading import load_agent
+
+        for path in film_episodes(load_agent(folder), [FIRST_SEED], folder):
+            console.print(str(path), highlight=False, soft_wrap=True)
 
 
 def evaluate(

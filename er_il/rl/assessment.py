@@ -1,6 +1,6 @@
 """What a trained agent can do: rollouts, counted, and some of them filmed."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -52,12 +52,24 @@ def assess(
     write_json(folder / "report.json", {"meta": meta, "cells": [{"task": task, "mode": mode} | report]})
     text = as_csv(rollouts, ["task", "decoder", *COUNTS])
     write_atomically(folder / "episodes.csv", lambda path: path.write_text(text))
-    if films:
-        with one_thread(), closing(environment_of(agent, render_mode="rgb_array")) as env:
-            for seed in seeds[:films]:
-                trace, pictures = record_episode(agent.act, env, task, mode, seed)
-                write_film(pictures, folder / f"episode_{seed}.mp4", RATE)
-                save_rollout(trace, folder / f"episode_{seed}.rrd")
-                trace.save(folder / f"episode_{seed}.npz")
-                advance()
+    for _ in film(agent, seeds[:films], folder):
+        advance()
     return report
+
+
+def film(agent: AgentPolicy, seeds: Sequence[int], folder: Path) -> Iterator[Path]:
+    """Film an agent's episodes, each with a recording for Rerun and a trace beside it.
+
+    Yields:
+        The path of each film.
+    """
+    if not seeds:
+        return
+    with one_thread(), closing(environment_of(agent, render_mode="rgb_array")) as env:
+        for seed in seeds:
+            trace, pictures = record_episode(agent.act, env, agent.config.task, agent.config.mode, seed)
+            path = folder / f"episode_{seed}.mp4"
+            write_film(pictures, path, RATE)
+            save_rollout(trace, path.with_suffix(".rrd"))
+            trace.save(path.with_suffix(".npz"))
+            yield path

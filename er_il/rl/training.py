@@ -1,4 +1,7 @@
-"""The training of an agent by Stable-Baselines3's SAC, in checkpoints, from the last of which it goes on."""
+"""The training of an agent by Stable-Baselines3's SAC, in checkpoints, from the last of which it goes on.
+
+Interrupted or not, it gives the same agent, number by number.
+"""
 
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack, closing
@@ -32,7 +35,7 @@ from er_il.support.provenance import provenance
 TRAINING = "training.json"  # what was asked for
 TENSORBOARD = "tensorboard"
 _SEEDS = 100_000_000  # of starts to learn from: above those of demonstrations and evaluations
-_SEEDS_PER_TRAINING, _SEEDS_PER_START = 100_000, 100
+_SEEDS_PER_TRAINING, _SEEDS_PER_START = 100_000, 100  # between two milestones, one an environment
 
 
 @dataclass(frozen=True)
@@ -143,11 +146,20 @@ class _Run(BaseCallback):
         if (last := last_checkpoint(training.out)) is not None:
             progress = load_state(last / STATE, self._learners)
             self._milestones = [Milestone(**each) for each in progress["milestones"]]
-        envs.seed(_SEEDS + seed * _SEEDS_PER_TRAINING + len(self._milestones) * _SEEDS_PER_START)
+        self._seed_starts()
 
     @property
     def _learners(self) -> dict[str, SAC]:
         return {"task": self._sac} | ({"controller": self._controller} if self._controller else {})
+
+    def _seed_starts(self) -> None:
+        training, number = self._training, len(self._milestones)
+        self._environments.seed(_SEEDS + training.seed * _SEEDS_PER_TRAINING + number * _SEEDS_PER_START)
+
+    @property
+    def _environments(self) -> VecEnv:
+        assert self._sac.env is not None
+        return self._sac.env
 
     def learn(self) -> list[Milestone]:
         """Learn to the end."""
@@ -166,6 +178,9 @@ class _Run(BaseCallback):
         every = self._training.settings.milestone
         if self.num_timesteps // every > (self._milestones[-1].steps // every if self._milestones else 0):
             self._pause()
+            # New episodes, as after an interruption here: whether there was one makes no difference.
+            self._seed_starts()
+            self._sac._last_obs = self._environments.reset()
 
     def _on_training_end(self) -> None:
         if not self._milestones or self._milestones[-1].steps < self.num_timesteps:
