@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import yaml
 from acting import SMALL
+from documented import documented, run
 from file_jobs import InOrder
 from matplotlib.axes import Axes
 from scipy.stats import trim_mean
@@ -34,6 +35,9 @@ TINY = {
     "training_seeds": [0],
     "episodes": 2,
 }
+
+
+PLACES = (("configs/", ".yaml"), ("outputs/benchmark/", ""), ("results/", ""))  # of a grid and what comes of it
 
 
 def grid(**changes: Any) -> AgentGrid:
@@ -93,9 +97,11 @@ def test_a_grid_of_agents_from_end_to_end(
 ) -> None:
     monkeypatch.setattr("er_il.support.workers.LocalExecutor", lambda workers: nullcontext(InOrder()))
     monkeypatch.setattr(Settings, "shipped", lambda pixels: SMALL)
-    file, out, results = tmp_path / "tiny.yaml", tmp_path / "out", tmp_path / "results"
+    monkeypatch.chdir(tmp_path)
+    file, out, results = (Path(f"{name}rl_full_body{suffix}") for name, suffix in PLACES)
+    file.parent.mkdir()
     file.write_text(yaml.safe_dump(TINY))
-    benchmark(file, out=out, results=results)
+    run("er-il", *documented("docs/reinforcement_learning.md", "er-il benchmark"))
     assert "reach_target task: 0 of 2 (2/2 cells)" in capsys.readouterr().out
     report = json.loads((results / "results.json").read_text())
     cells, meta = report["cells"], report["meta"]

@@ -9,16 +9,17 @@ import numpy as np
 import pytest
 import torch
 from acting import MODE, SMALL, TASK, homing_agent
+from documented import documented, train_in_process
+from documented import run as documented_run
 from lerobot.datasets import LeRobotDataset
 from lerobot.scripts import lerobot_eval
-from rich.progress import Progress
 from safetensors.torch import load_file
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from er_il.cli import main
 from er_il.datasets.dataset import Dataset
 from er_il.datasets.recipe import Recipe
-from er_il.datasets.recording import generate
+from er_il.datasets.record import read_episodes
 from er_il.envs import make_rl_env
 from er_il.evaluation.trace import Trace
 from er_il.rl.assessment import environment_of
@@ -173,13 +174,27 @@ def test_agents_are_no_policies_of_robots(homing: Path) -> None:
 
 
 @pytest.mark.slow
-def test_an_agents_rollouts_become_datasets(homing: Path, tmp_path: Path) -> None:
-    demonstrator = AgentDemonstrator(homing)
-    recipe = demonstrator.recipe(Recipe.load(TASK).resized(2))
-    generate(recipe, ["joint", "erj"], tmp_path, Progress(disable=True), 1, demonstrator=demonstrator)
-    dataset = Dataset(tmp_path / "erj")
+@pytest.mark.usefixtures("one_worker", "quiet_logging")
+def test_an_agents_rollouts_become_datasets_and_these_policies(
+    homing: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(homing, "policies/reach_target/rl_task")
+    page = "docs/reinforcement_learning.md"
+    documented_run("er-il", *documented(page, "er-il generate"), "--episodes", "2")
+    train_in_process(monkeypatch, "--batch_size=2")
+    documented_run("er-il", *documented(page, "er-il train"), "--steps", "2")
+    out = tmp_path / "datasets/by_agent"
+    dataset = Dataset(out / "erj")
     assert (dataset.info["fps"], dataset.info["total_episodes"]) == (10, 2)
-    assert LeRobotDataset("er_il/again", tmp_path / "joint").num_frames == dataset.info["total_frames"]
+    assert LeRobotDataset("er_il/again", out / "joint").num_frames == dataset.info["total_frames"]
+    demonstrator = AgentDemonstrator(homing)
+    commands = read_episodes(out / "joint")[0].leader
+    world = make_rl_env(TASK, MODE).world  # commanded as recorded, the arm does it again
+    seed = read_episodes(out / "joint")[0].seed
+    world.reset(seed=seed, options={"beyond_success": True})  # pyright: ignore[reportAttributeAccessIssue]
+    ends = [world.step(command)[4]["is_success"] for command in commands]  # pyright: ignore[reportAttributeAccessIssue]
+    assert ends[-1]
     with pytest.raises(PolicyError, match="task reach_target, not stack_wine"):
         demonstrator.recipe(Recipe.load("stack_wine"))
 

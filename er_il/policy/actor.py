@@ -19,7 +19,9 @@ from threadpoolctl import threadpool_limits
 
 from er_il.control.commander import BEST_EFFORT
 from er_il.envs.contract import decoder_for, policy_contract
+from er_il.envs.learning import RATE
 from er_il.envs.lerobot_plugin import ErIlEnvConfig
+from er_il.envs.origin import training_info
 from er_il.policy.rows import POLICY_ROWS
 from er_il.support.errors import PolicyError
 
@@ -27,7 +29,7 @@ from er_il.support.errors import PolicyError
 def environment_of(
     policy: Path, task: str, decoder_name: str, on_invalid: str = BEST_EFFORT, posture: Sequence[float] = ()
 ) -> ErIlEnvConfig:
-    """Describe the environment that a policy needs: its arm, its rotation code, its cameras.
+    """Describe the environment that a policy needs: its arm, its rotation code, its cameras, its rate.
 
     Check the policy against the environment that comes of it: :func:`er_il.envs.contract.check_policy`.
     """
@@ -35,8 +37,10 @@ def environment_of(
     chosen = decoder_for(decoder_name, contract)
     images = _load_config(policy).image_features
     sizes = {feature.shape[-1] for feature in images.values()}
+    info = training_info(policy)
     return ErIlEnvConfig(
         task=task,
+        fps=RATE if info and info["fps"] == RATE else ErIlEnvConfig.fps,  # an agent demonstrated
         action_space=chosen.space,
         resolution=chosen.resolution,
         posture=list(posture),
