@@ -16,6 +16,8 @@ import numpy as np
 import psutil
 from faulty import LOG, start
 
+from er_il.rl.settings import Settings
+
 # What commands write that differs between two undisturbed runs as well: times, places, and films, whose encoder draws
 # its identifiers.
 _VOLATILE = {"train_config.json", "README.md", "benchmark.json", "results.json"}
@@ -50,11 +52,17 @@ def commands(data: Path) -> tuple[Command, ...]:
     demo = ("--task", "push_button_elbow", "--decoders", "task-nearest", "--demonstrations", "2", "--steps", "2")
     images = ("--cameras", "wrist", "--size", "32")
     train = ("train", "push_button_elbow", "erj", "--dataset", str(data / "erj"), "--steps", "4", "--out", "out")
+    settings = data / "sac.yaml"
+    values = Settings.shipped(pixels=False).to_dict()
+    few_steps = {"environments": 2, "warm_up": 40, "batch_size": 16, "milestone": 64, "evaluations": 1}
+    settings.write_text(json.dumps(values | few_steps))
+    learn = ("--steps", "320", "--config", str(settings))
     return (
         Command("generate", ("generate", "push_button_elbow", *few), 30),
         Command("generate with a camera", ("generate", "push_button_elbow", *few, *images), 16),
         Command("encode", ("encode", str(data / "erj"), "--to", "era", "--out", "out"), 24),
         Command("train", train, 12),
+        Command("rl train", ("rl", "train", "reach_target", "task", *learn, "--out", "out"), 12),
         Command("benchmark", ("benchmark", str(grid), "--out", "out", "--results", "results"), 10, workers=2),
         Command("demo", ("demo", *demo, "--rollouts", "2", "--out", "out"), 8, workers=2),
     )

@@ -6,6 +6,8 @@ Mistakes that er_il finds end LeRobot's commands with one line, too.
 import sys
 
 import er_il.envs.lerobot_plugin  # --env.type=er_il
+import er_il.rl.configuration_agent  # --policy.path=AGENT
+import er_il.rl.lerobot_env  # --env.type=er_il_rl
 import er_il.robots.hardware  # --robot.type=er_il_arm, er_il_sim; --teleop.type=er_il_scripted_leader
 import er_il.robots.processors  # noqa: F401  the decoding steps of policies and pipelines
 from er_il.robots.guard import check_command

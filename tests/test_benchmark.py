@@ -24,6 +24,7 @@ from er_il.evaluation.results import long_form, report_cells
 from er_il.evaluation.rollout import Rollout
 from er_il.experiments.films import telling_seed
 from er_il.experiments.grid import Cell, Grid, GridError
+from er_il.experiments.imitation import Imitation
 from er_il.experiments.plan import Plan
 from er_il.experiments.run import write_results
 from er_il.experiments.schedule import Schedule
@@ -137,7 +138,7 @@ def test_images_are_recorded_and_learnt_from_where_a_grid_says_so(tmp_path: Path
 
 
 def test_a_grid_without_the_reference_is_reported_without_differences(tmp_path: Path) -> None:
-    assert write_results(Plan(grid(decoders=["erj"]), tmp_path), tmp_path)["cells"] == []
+    assert write_results(Imitation(Plan(grid(decoders=["erj"]), tmp_path)), tmp_path)["cells"] == []
 
 
 def test_a_folder_holds_experiments_of_one_configuration(tmp_path: Path) -> None:
@@ -341,7 +342,7 @@ def test_a_grid_from_end_to_end(
         ["roll", "out", "task-grasp"],
     ]
     assert before.items() <= written(out).items()
-    report = write_results(grown, results)
+    report = write_results(Imitation(grown), results)
     rows = list(csv.DictReader(gzip.decompress((results / "episodes.csv.gz").read_bytes()).decode().splitlines()))
     assert [(row["decoder"], row["training_seed"], row["seed"]) for row in rows] == [
         (name, "0", seed) for name in ("joint", "task-nearest", "task-grasp") for seed in ("1000", "1001")
@@ -369,5 +370,5 @@ def test_a_grid_from_end_to_end(
         assert 0 < np.abs(second - first).mean() < np.abs(last - first).mean()  # the arm moves away
     assert strip.stat().st_size < 400_000
     assert len(table) > len((results / "episodes.csv.gz").read_bytes())
-    write_results(grown, results)
+    write_results(Imitation(grown), results)
     assert (results / "episodes.csv.gz").read_bytes() == table

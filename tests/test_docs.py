@@ -28,6 +28,8 @@ SMALLER = {
     "er-il generate": "--episodes 3",
     "er-il train": "--steps 2",
     "er-il eval": "--episodes 1",
+    "er-il rl train": "--steps 8 --no-film",
+    "er-il rl eval": "--episodes 1 --films 0",
     "lerobot-train": "--steps=2 --batch_size=2 --num_workers=0 --policy.device=cpu --dataset.video_backend=pyav "
     "--policy.pretrained_backbone_weights=null --policy.dim_model=32 --policy.dim_feedforward=32 --policy.n_heads=2",
     "lerobot-eval": "--eval.n_episodes=1 --eval.batch_size=1 --eval.recording=true",

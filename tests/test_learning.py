@@ -9,7 +9,7 @@ from gymnasium.utils.env_checker import check_env as gymnasium_check
 from stable_baselines3.common.env_checker import check_env as stable_baselines_check
 
 from er_il.envs import LearningEnv, make_rl_env
-from er_il.envs.learning import BOUNDS, INVALIDS, MODES, RATE, SUCCESSES
+from er_il.envs.learning import BOUNDS, DECISIONS, INVALIDS, MODES, RATE, SUCCESSES
 from er_il.support.errors import ArmError, NotResetError, NumbersError, ShapeError, UnknownNameError
 from sim_tasks import RL_TASKS
 
@@ -200,3 +200,44 @@ def test_imitation_tasks_are_learnable_too() -> None:
     state, _ = env.reset(seed=0)
     assert np.all(np.isfinite(state)) and len(names(env, "cup.")) == 9
     env.step(np.zeros(8, np.float32))
+
+
+@pytest.mark.parametrize(("mode", "longest"), [("joint", 0.05), ("era", 0.5), ("task", 2.5), ("erj", 2.5)])
+def test_the_papers_pace_waits_until_the_arm_has_settled(mode: str, longest: float) -> None:
+    env = make_rl_env("reach_target", mode, pace="settled", anchor="measured")
+    env.reset(seed=0)
+    data, action = env.world.data, np.zeros(env.action_space.shape, np.float32)  # pyright: ignore[reportAttributeAccessIssue]
+    action[:3] = 1.0
+    start = data.time
+    _, _, _, _, info = env.step(action)
+    taken = data.time - start
+    assert 0.05 - 1e-6 <= taken <= longest + 1e-6
+    if mode == "joint":
+        assert taken == pytest.approx(0.05, abs=0.003)  # whole steps of physics
+    else:
+        assert taken > 0.1 and np.abs(info["command"] - env.world.joint_positions).max() < 0.02
+
+
+def test_deltas_count_from_the_measured_joints_if_asked() -> None:
+    action = np.zeros(8, np.float32)
+    action[0] = 1.0
+    commands = {}
+    for anchor in ("command", "measured"):
+        env = make_rl_env("reach_target", "joint", anchor=anchor, start_range=0.0)
+        env.reset(seed=0)
+        env.step(action)
+        measured = env.world.joint_positions[0]
+        commands[anchor] = env.step(action)[4]["command"][0]
+        expected = 2 * BOUNDS.angle if anchor == "command" else measured + BOUNDS.angle
+        assert commands[anchor] == pytest.approx(expected, abs=1e-6)
+    assert abs(commands["measured"] - commands["command"]) > 1e-3
+
+
+def test_an_episode_has_at_most_as_many_decisions_at_the_papers_pace() -> None:
+    env = make_rl_env("reach_target", "task", pace="settled")
+    env.reset(seed=0)
+    for decision in range(1, DECISIONS + 1):
+        _, _, terminated, truncated, _ = env.step(np.zeros(7, np.float32))
+        assert not terminated and truncated == (decision == DECISIONS)
+    with pytest.raises(UnknownNameError, match="Unknown pace 'slow'"):
+        make_rl_env("reach_target", "task", pace="slow")

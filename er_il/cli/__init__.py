@@ -26,6 +26,7 @@ COMMANDS: dict[str, str] = {
     "generate": "generate",
     "replay": "replay",
     "retarget": "retarget",
+    "rl": "rl",
     "study": "study",
     "train": "train",
     "verify": "verify",

@@ -14,13 +14,13 @@ if TYPE_CHECKING:
 def benchmark(
     grid: Positional[Path], *, out: Path | None = None, results: Path | None = None, ray_address: str | None = None
 ) -> None:
-    """Run what a grid file asks for: demonstrations, trainings and rollouts of every cell; then report.
+    """Run what a grid file asks for: trainings and rollouts of every cell, and what they need; then report.
 
     Interrupted, the same command resumes. A cell that fails is reported and does not stop the rest. A grid
     that is done is only reported again.
 
     Args:
-        grid: YAML file, such as configs/table1.yaml.
+        grid: YAML file, such as configs/table1.yaml, or of agents, such as configs/rl_full_body.yaml.
         out: Folder of everything that it makes; outputs/benchmark/<name of the grid file> if omitted.
         results: Folder of the report; results/<name of the grid file> if omitted.
         ray_address: Address of a Ray cluster to run on, such as 10.0.0.5:6379, whose machines share the folder
@@ -28,24 +28,23 @@ def benchmark(
     """
     from rich.console import Console
 
-    from er_il.experiments.grid import Grid
+    from er_il.experiments.kinds import read_plan
 
-    asked = Grid.from_file(grid)
+    plan = read_plan(grid, (out or Path("outputs/benchmark") / grid.stem).resolve())
     from er_il.cli.progress import make_progress
     from er_il.experiments.cluster import RayExecutor
-    from er_il.experiments.plan import Plan
     from er_il.support.atomic_files import check_writable
     from er_il.support.workers import LocalExecutor, cores
 
-    plan = Plan(asked, (out or Path("outputs/benchmark") / grid.stem).resolve())
     folder, console = results or Path("results") / grid.stem, Console()
     check_writable(plan.out, folder)
     workplace = RayExecutor(ray_address) if ray_address else LocalExecutor(cores())
     plan.check()  # seconds of imports follow: mistakes are told before
     with workplace as executor, make_progress(console) as progress:
+        from er_il.experiments.kinds import experiment_of
         from er_il.experiments.run import run
 
-        outcome = run(plan, executor, progress, folder)
+        outcome = run(experiment_of(plan), executor, progress, folder)
     report(console, outcome, folder)
 
 

@@ -39,9 +39,10 @@ def demo(
     folder, console = out or Path("outputs") / ("demo" if task == "reach_cup" else task), Console()
     plan = Plan(grid, folder.resolve(), recorders=cores())
     plan.check()  # seconds of imports follow: mistakes are told before
+    from er_il.experiments.imitation import Imitation
     from er_il.experiments.run import run
 
     # All trainings at once, be they more than the cores: in turns, a core would idle beside the last.
     with LocalExecutor(max(cores(), len(grid.spaces))) as executor, make_progress(console) as progress:
-        outcome = run(plan, executor, progress, folder, with_films=True)
+        outcome = run(Imitation(plan), executor, progress, folder, with_films=True)
     report(console, outcome, folder)

@@ -17,6 +17,7 @@ def generate(
     cameras: Annotated[str | None, arg(metavar="NAME,NAME")] = None,
     size: int | None = None,
     weights: Path | None = None,
+    agent: Path | None = None,
     out: Path | None = None,
 ) -> None:
     """Record demonstrations of a task and write one LeRobot dataset a space.
@@ -34,6 +35,7 @@ def generate(
         cameras: Cameras to record, separated by commas, such as wrist,shoulder.
         size: Width and height of the cameras' images [px].
         weights: File of the weights of erx, which er-il advise --fit erx writes; those of the arm if omitted.
+        agent: Folder of a trained agent (er-il rl train), which demonstrates instead of the leader, 10 times a second.
         out: Folder of the datasets; datasets/<task> if omitted, and datasets/<task>_<arm> for another arm than the
             recipe's.
     """
@@ -53,14 +55,21 @@ def generate(
     asked = _split(spaces) or ()
     file = read_weights(weights, asked)
     rows = file.of(robot_arms(recipe.arm)) if file else {}
+    from er_il.datasets.demos import LEADER
     from er_il.datasets.recording import generate as generate_datasets
     from er_il.support.counts import tally
 
+    demonstrator = LEADER
+    if agent is not None:
+        from er_il.rl.demonstrator import AgentDemonstrator
+
+        demonstrator = AgentDemonstrator(agent.resolve())
+        recipe = demonstrator.recipe(recipe)
     name = task if recipe.arm == usual.arm else f"{task}_{recipe.arm}"
     folder = out if out is not None else Path("datasets") / name
     console = Console()
     with make_progress(console) as progress:
-        generated = generate_datasets(recipe, asked, folder, progress, cores(), rows)
+        generated = generate_datasets(recipe, asked, folder, progress, cores(), rows, demonstrator)
     for space, path in generated.paths.items():
         console.print(
             f"{path}: {'written' if space in generated.new else 'was there already'}", highlight=False, soft_wrap=True

@@ -1,12 +1,12 @@
 """Demonstrations: the scripted leader plays a task, the follower mirrors it, and what happened is kept."""
 
 from collections import Counter, deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import gymnasium
 import numpy as np
@@ -41,6 +41,18 @@ class Demo:
 
     def __len__(self) -> int:
         return len(self.joints)
+
+    @classmethod
+    def of_episode(cls, seed: int, joints: Sequence[Any], seen: Sequence[Mapping[str, Any]]) -> "Demo":
+        """Put a demonstration together from what was sent, and the environment's observations, at each step."""
+        cameras = seen[0].get("pixels", {})
+        return cls(
+            seed=seed,
+            joints=np.stack(joints).astype(np.float32),
+            state=_stack(seen, "agent_pos"),
+            environment_state=_stack(seen, "environment_state"),
+            images={camera: np.stack([each["pixels"][camera] for each in seen]) for camera in cameras},
+        )
 
     def save(self, path: Path) -> None:
         """Write the demo; the file is whole or absent."""
@@ -95,17 +107,34 @@ def record_demo(world: gymnasium.Env[Any, Any], seed: int, disturbance: float = 
         return "no plan"
     if not info["is_success"]:
         return info["failure"] or "unfinished"
-    seen = [row[0] for row in rows]
-    return Demo(
-        seed=seed,
-        joints=np.stack([row[1] for row in rows]),
-        state=_stack(seen, "agent_pos"),
-        environment_state=_stack(seen, "environment_state"),
-        images={camera: np.stack([each["pixels"][camera] for each in seen]) for camera in seen[0].get("pixels", {})},
-    )
+    return Demo.of_episode(seed, [row[1] for row in rows], [row[0] for row in rows])
 
 
-def collect(recipe: Recipe, folder: Path, workers: int) -> Iterator[tuple[int, str]]:
+Record = Callable[[int], Demo | str]  # the demonstration of a seed, or why it is dropped
+
+
+class Demonstrator(Protocol):
+    """Who demonstrates. It travels to worker processes."""
+
+    def starting(self, recipe: Recipe) -> Record:
+        """Make ready to record a recipe's demonstrations."""
+        ...
+
+
+@dataclass(frozen=True)
+class Leader:
+    """The task's scripted leader."""
+
+    def starting(self, recipe: Recipe) -> Record:
+        return partial(record_demo, make_world(recipe), disturbance=recipe.disturbance)
+
+
+LEADER = Leader()
+
+
+def collect(
+    recipe: Recipe, folder: Path, workers: int, demonstrator: Demonstrator = LEADER
+) -> Iterator[tuple[int, str]]:
     """Record demos in worker processes until the recipe has its episodes.
 
     Finished demos are stored in ``folder`` (see :func:`demo_path`), and found there again by the next
@@ -120,7 +149,7 @@ def collect(recipe: Recipe, folder: Path, workers: int) -> Iterator[tuple[int, s
     """
     seeds, pending = recipe.demo_seeds(), deque()
     kept, dropped = 0, Counter[str]()
-    with StatefulWorkers(workers, partial(_Recorder, recipe, folder)) as pool:
+    with StatefulWorkers(workers, partial(_Recorder, recipe, folder, demonstrator)) as pool:
         while kept < recipe.episodes:
             while len(pending) < recipe.episodes - kept:
                 seed = next(seeds)
@@ -135,9 +164,10 @@ def collect(recipe: Recipe, folder: Path, workers: int) -> Iterator[tuple[int, s
             else:
                 kept += 1
             if dropped.total() >= kept + HOPELESS:
+                who = f"the agent {recipe.agent}" if recipe.agent else "the leader"
                 raise DatasetError(
                     f"{dropped.total()} of the first {kept + dropped.total()} demos failed ({tally(dropped)}): "
-                    f"the leader cannot do {recipe.task} like this. Look at the recipe's randomisation."
+                    f"{who} cannot do {recipe.task} like this. Look at the recipe's randomisation."
                 )
             yield seed, reason
 
@@ -153,19 +183,20 @@ class _Recorder:
 
     recipe: Recipe
     folder: Path
-    world: gymnasium.Env[Any, Any] | None = None
+    demonstrator: Demonstrator
+    started: Record | None = None
 
     def record(self, seed: int) -> str:
         path = demo_path(self.folder, seed)
         if path.exists():
             return ""
-        self.world = self.world or make_world(self.recipe)
-        outcome = record_demo(self.world, seed, self.recipe.disturbance)
+        self.started = self.started or self.demonstrator.starting(self.recipe)
+        outcome = self.started(seed)
         if isinstance(outcome, str):
             return outcome
         outcome.save(path)
         return ""
 
 
-def _stack(observations: list[Any], key: str) -> Floats:
+def _stack(observations: Sequence[Any], key: str) -> Floats:
     return np.stack([each[key] for each in observations]).astype(np.float32)

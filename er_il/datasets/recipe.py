@@ -17,6 +17,7 @@ DEMOS_PER_SEED = 10_000
 
 LARGEST_DISTURBANCE = 0.1  # [rad]: more is no slip but another way
 
+RATE = 20  # [Hz] of environments that are not asked for another one
 TRAIN, VALIDATION = "train", "validation"
 SUFFIX = ".yaml"
 
@@ -40,6 +41,8 @@ class Recipe(Declaration):
     # [rad] by which the follower is pushed off the leader's way (er_il.datasets.disturbance)
     disturbance: Annotated[StrictInt | StrictFloat, Field(ge=0, lt=LARGEST_DISTURBANCE)] = 0.0
     randomisation: Mapping[StrictStr, Any] = Field(default_factory=dict)  # keyword arguments of the environment
+    rate: Annotated[StrictInt, Field(ge=1)] = RATE  # [Hz] of control
+    agent: StrictStr = ""  # folder of the agent that demonstrates, which decides at the rate; the leader if empty
 
     @field_validator("cameras")
     @classmethod
@@ -99,6 +102,7 @@ class Recipe(Declaration):
             "arm": self.arm,
             "cameras": self.cameras,
             "image_size": self.image_size,
+            **({} if self.rate == RATE else {"rate": self.rate}),
             **self.randomisation,
         }
 

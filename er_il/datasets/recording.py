@@ -15,7 +15,7 @@ from rich.progress import Progress
 from er_il.arms.arm import Weights
 from er_il.arms.robot import robot_arms
 from er_il.datasets.dataset import Dataset, datasets_in
-from er_il.datasets.demos import Demo, collect, demo_path, make_world
+from er_il.datasets.demos import LEADER, Demo, Demonstrator, collect, demo_path, make_world
 from er_il.datasets.recipe import Recipe
 from er_il.datasets.record import DatasetRecord
 from er_il.kinematics.linear_coordinates import SPEC_KEY
@@ -43,6 +43,7 @@ def generate(
     progress: Progress,
     workers: int,
     weights: Mapping[str, Weights] = MappingProxyType({}),
+    demonstrator: Demonstrator = LEADER,
 ) -> Generated:
     """Record a recipe's demos and write one dataset a space into ``out``.
 
@@ -56,6 +57,7 @@ def generate(
         progress: Where to show progress.
         workers: Number of worker processes.
         weights: Of ERX (n-6, n), by the arm's label; those of the arms where it says nothing.
+        demonstrator: Who demonstrates.
 
     Raises:
         UnknownNameError: unknown task, space, arm or camera.
@@ -79,7 +81,7 @@ def generate(
         new = tuple(space for space in asked if space not in there)
         first = out / min(there, default=asked[0])
         if not there:
-            _record(recipe, layouts[first.name], first, work, progress, workers)
+            _record(recipe, layouts[first.name], first, work, progress, workers, demonstrator)
         if missing := {space: layouts[space] for space in new if out / space != first}:
             _encode(Dataset(first), out, missing, progress)
         for leftover in (work / _DEMOS, work / _DATASET):
@@ -89,7 +91,15 @@ def generate(
     return Generated({space: out / space for space in asked}, new, DatasetRecord.read(first).dropped)
 
 
-def _record(recipe: Recipe, layout: Layout, target: Path, work: Path, progress: Progress, workers: int) -> None:
+def _record(
+    recipe: Recipe,
+    layout: Layout,
+    target: Path,
+    work: Path,
+    progress: Progress,
+    workers: int,
+    demonstrator: Demonstrator,
+) -> None:
     """Collect the demos and write the first dataset from them."""
     world = make_world(recipe)
     try:
@@ -100,7 +110,7 @@ def _record(recipe: Recipe, layout: Layout, target: Path, work: Path, progress: 
         dropped: dict[int, str] = {}
         writer = Writer(recipe, world, layout, work / _DATASET)
         bar = progress.add_task(f"Record {recipe.task}", total=recipe.episodes)
-        for seed, reason in collect(recipe, demos, workers):
+        for seed, reason in collect(recipe, demos, workers, demonstrator):
             if reason:
                 dropped[seed] = reason
                 progress.update(bar, description=f"Record {recipe.task} ({len(dropped)} dropped)")

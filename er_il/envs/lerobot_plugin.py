@@ -22,6 +22,8 @@ from er_il.envs.tasks import task_id
 from er_il.envs.wrapper import ActionSpaceEnv, make_action_space_env
 from er_il.spaces.layout import Layout
 
+_USUAL = 20  # [Hz]
+
 
 @EnvConfig.register_subclass("er_il")
 @dataclass
@@ -29,6 +31,7 @@ class ErIlEnvConfig(EnvConfig):
     """A simulated task whose actions are encoded in an action space.
 
     Attributes:
+        fps: Control rate [Hz], of the tasks here 20 or 10, as in the dataset that the policy was trained on.
         action_space: ``joint``, ``task``, ``erj``, ``era``, or ``erj@<joint>`` if ERJ commands another joint,
             ``era@stereo`` with another reference of the arm angle; with ``delta_`` in front, changes of its commands.
         resolution: What IK does with the freedom that task space leaves: ``nearest``, ``posture`` or ``clear``.
@@ -45,7 +48,7 @@ class ErIlEnvConfig(EnvConfig):
     """
 
     task: str | None = "reach_cup"
-    fps: int = 20
+    fps: int = _USUAL
     action_space: str = "erj"
     resolution: str = NEAREST
     posture: list[float] = field(default_factory=list)
@@ -60,7 +63,9 @@ class ErIlEnvConfig(EnvConfig):
 
     def __post_init__(self) -> None:
         check_answer(self.on_invalid)
-        probe = _probe(self.gym_id, self.arm, tuple(self.cameras), self.image_size)
+        # An environment may know no rate but its own: it is asked for one only if it is not the usual one.
+        self._rate = None if self.fps == _USUAL else self.fps
+        probe = _probe(self.gym_id, self.arm, tuple(self.cameras), self.image_size, self._rate)
         self.fps = probe.fps
         action = PolicyFeature(FeatureType.ACTION, (len(self.layout.encoded_names),))
         self.features = {ACTION: action} | probe.features
@@ -76,6 +81,7 @@ class ErIlEnvConfig(EnvConfig):
             "arm": self.arm,
             "cameras": tuple(self.cameras),
             "image_size": self.image_size,
+            **_asking(self._rate),
             "render_mode": "rgb_array",  # the stock commands film some episodes
             "visualization_width": self.visualization_width,
             "visualization_height": self.visualization_height,
@@ -136,10 +142,14 @@ class _Probe:
     names: dict[str, str]  # of these for policies
 
 
+def _asking(rate: int | None) -> dict[str, Any]:
+    return {} if rate is None else {"rate": rate}
+
+
 @lru_cache
-def _probe(gym_id: str, arm: str, cameras: tuple[str, ...], image_size: int) -> _Probe:
+def _probe(gym_id: str, arm: str, cameras: tuple[str, ...], image_size: int, rate: int | None) -> _Probe:
     """Read an environment's rate and observations off one instance, once a process."""
-    env = gymnasium.make(gym_id, arm=arm, cameras=cameras, image_size=image_size)
+    env = gymnasium.make(gym_id, arm=arm, cameras=cameras, image_size=image_size, **_asking(rate))
     observation = env.observation_space
     assert isinstance(observation, gymnasium.spaces.Dict)
     features, names = {}, {}

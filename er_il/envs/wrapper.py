@@ -92,6 +92,11 @@ class ActionSpaceEnv(
         """The joint angles (n,) [rad] that were commanded last, which a delta counts from; one arm after the other."""
         return np.concatenate([arm.last for arm in self._commander.arms])
 
+    def anchor(self) -> None:
+        """Let changes count from where the arms are, until the next command."""
+        for arm, q in zip(self._commander.arms, self._measured_arms(), strict=True):
+            arm.anchor(q)
+
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Start an episode; LeRobot's own options are for its wrappers and end here."""
         own = {name: value for name, value in (options or {}).items() if not name.startswith(LEROBOT_OPTIONS)}

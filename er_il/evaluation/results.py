@@ -105,24 +105,30 @@ def summarise(rollouts: pd.DataFrame) -> dict[str, Any]:
     return report
 
 
-def report_cells(rollouts: pd.DataFrame) -> list[dict[str, Any]]:
+def report_cells(rollouts: pd.DataFrame, cell_of: Sequence[str] = CELL) -> list[dict[str, Any]]:
     """Return each cell as JSON: the rollouts of all training seeds together, then seed by seed.
 
     Where :data:`REFERENCE` met the same initial states with policies of the same training seeds, the paired
     difference to it stands beside.
+
+    Args:
+        rollouts: In long form.
+        cell_of: The columns of a cell: ``task``, ``decoder``, and what else tells cells apart.
     """
-    reference = rollouts.loc[rollouts["decoder"] == REFERENCE, [*LABELS, "seed", "success"]]
+    matched = [*(column for column in cell_of if column != "decoder"), "training_seed", "seed"]
+    reference = rollouts.loc[rollouts["decoder"] == REFERENCE, [*matched, "success"]]
     cells = []
-    for key, cell in rollouts.groupby(CELL, sort=False):
-        task, decoder, demonstrations = _labels(key)
-        report = {"task": task, "decoder": decoder} | summarise(cell) | {"demonstrations": int(demonstrations)}
+    for key, cell in rollouts.groupby(list(cell_of), sort=False):
+        labels = dict(zip(cell_of, _labels(key), strict=True))
+        others = {name: int(value) for name, value in labels.items() if name not in ("task", "decoder")}
+        report = {"task": labels["task"], "decoder": labels["decoder"]} | summarise(cell) | others
         per_seed = {seed: summarise(part) for seed, part in cell.groupby("training_seed", sort=False)}
         report["per_seed"] = [
             {"training_seed": int(str(seed))} | {name: each[name] for name in ("successes", "episodes", "interval")}
             for seed, each in per_seed.items()
         ]
-        paired = cell.merge(reference, on=["task", "demonstrations", "training_seed", "seed"], suffixes=("", "_theirs"))
-        if decoder != REFERENCE and len(paired):
+        paired = cell.merge(reference, on=matched, suffixes=("", "_theirs"))
+        if labels["decoder"] != REFERENCE and len(paired):
             difference, low, high = paired_difference(paired["success"].tolist(), paired["success_theirs"].tolist())
             report[f"difference_to_{REFERENCE}"] = {"difference": difference, "interval": [low, high]}
         cells.append(report)

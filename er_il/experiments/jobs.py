@@ -2,10 +2,9 @@
 
 import os
 import re
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,15 +16,14 @@ from er_il.datasets.record import read_episodes
 from er_il.datasets.recording import generate
 from er_il.evaluation.elbow import ElbowReference
 from er_il.evaluation.posture_baselines import POSTURE_BASELINES, POSTURE_DECODER
-from er_il.experiments.schedule import Job
+from er_il.experiments.schedule import Job, notes
 from er_il.kinematics.rotation import Quaternion
 from er_il.policy.configuration import default_config
 from er_il.policy.training import PRECISION, Training, train_episodes
 from er_il.spaces.registry import ERX
 from er_il.support.atomic_files import write_json
-from er_il.support.cost import Cost, measured
+from er_il.support.cost import measured
 from er_il.support.errors import ErIlError
-from er_il.support.provenance import git_sha
 
 Array = NDArray[np.float64]
 
@@ -131,7 +129,7 @@ class Train(Job):
                     code = training.run(file)
                 if code:
                     raise ErIlError(f"lerobot-train ended with exit code {code}.")
-        write_json(self.path, _notes(cost) | {"mixed_precision": os.environ.get(PRECISION, "no")})
+        write_json(self.path, notes(cost) | {"mixed_precision": os.environ.get(PRECISION, "no")})
 
 
 @dataclass(frozen=True)
@@ -161,7 +159,7 @@ class RollOut(Job):
                 posture=posture(leader).tolist() if posture else (),
                 elbow=elbow,
             )
-        save_rollouts(rollouts, self.path, _notes(cost))
+        save_rollouts(rollouts, self.path, notes(cost))
 
 
 @dataclass(frozen=True)
@@ -210,7 +208,3 @@ def _training_paths(dataset: Path, demonstrations: int | None) -> tuple[list[Arr
     episodes = read_episodes(dataset)
     chosen = [episodes[i] for i in train_episodes(Dataset(dataset).info)[:demonstrations]]
     return [demo.leader.astype(np.float64) for demo in chosen], [demo.state.astype(np.float64) for demo in chosen]
-
-
-def _notes(cost: Cost) -> dict[str, Any]:
-    return {"cost": asdict(cost), "git": git_sha()}

@@ -16,19 +16,15 @@ from er_il.evaluation.posture_baselines import space_of
 from er_il.evaluation.rollout import FIRST_SEED
 from er_il.experiments.grid import Cell, Grid
 from er_il.experiments.jobs import Demonstrate, FitWeights, RollOut, Train
+from er_il.experiments.owner import OWNER, claimed, owner_of
 from er_il.policy.configuration import default_config, default_steps, read_config
 from er_il.policy.rows import POLICY_ROWS
 from er_il.spaces.joint import JOINT
 from er_il.spaces.registry import ERX
-from er_il.support.atomic_files import PARTIAL, write_json
 from er_il.support.errors import ErIlError
-from er_il.support.folder_lock import LOCK, folder_lock
-from er_il.support.json_files import read_json
 
 if TYPE_CHECKING:
     import pandas as pd
-
-OWNER = "benchmark.json"
 
 
 @dataclass(frozen=True)
@@ -46,10 +42,7 @@ class Plan:
         Raises:
             ErIlError: another command works in it, or :meth:`check` refuses it.
         """
-        self.check()  # a folder of something else is left as it is, without a lock
-        self.out.mkdir(parents=True, exist_ok=True)
-        with folder_lock(self.out):
-            write_json(self.out / OWNER, self.check())
+        with claimed(self.out, self.check):
             yield
 
     def check(self) -> dict[str, Any]:
@@ -59,11 +52,7 @@ class Plan:
             ErIlError: it holds something else, demonstrations of another recipe than today's, or policies trained by
                 another configuration.
         """
-        owner, grid = self.out / OWNER, self.grid
-        found = {path.name for path in self.out.iterdir()} if self.out.exists() else set()
-        strangers = {name for name in found - {LOCK} if PARTIAL not in name}  # a kill may come before the owner is said
-        if strangers and OWNER not in found:
-            raise ErIlError(f"{self.out} holds something else than an experiment; choose another --out.")
+        owned, grid = owner_of(self.out), self.grid
         for cell in grid.cells:
             source = self._source(cell)
             dataset = source.dataset(space_of(cell.decoder))
@@ -73,10 +62,9 @@ class Plan:
                     f"Choose another --out, or delete what {self.out} holds of {cell.task}."
                 )
         mine = {name: read_config(default_config(name, grid.configuration)) for name in grid.spaces}
-        owned = read_json(owner, ErIlError) if owner.exists() else {"configurations": {}}
-        theirs = owned.get("configurations")
+        theirs = {} if owned is None else owned.get("configurations")
         if not isinstance(theirs, dict):
-            raise ErIlError(f"{owner} is damaged: it does not say how the folder's policies were trained.")
+            raise ErIlError(f"{self.out / OWNER} is damaged: it does not say how the folder's policies were trained.")
         if changed := [name for name in mine if name in theirs and mine[name] != theirs[name]]:
             raise ErIlError(
                 f"{self.out} holds policies trained by other configurations than today's, of "

@@ -1,26 +1,22 @@
 """An experiment from its plan to its results: a report as JSON, every rollout as a row of a CSV, pictures, pages."""
 
 import gzip
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from rich.progress import Progress
 
-from er_il.evaluation.results import EPISODES, RESULTS, as_csv, load_notes, report_cells
-from er_il.evaluation.rollout import FIRST_SEED
-from er_il.experiments.films import films, show
-from er_il.experiments.plan import Plan
-from er_il.experiments.schedule import Executor, Schedule
-from er_il.report.grid_page import write_pages
+from er_il.evaluation.results import EPISODES, RESULTS, as_csv
+from er_il.experiments.schedule import Executor, Job, Schedule
 from er_il.support.atomic_files import write_atomically, write_json
-from er_il.support.errors import ErIlError
-from er_il.support.json_files import read_json
 from er_il.support.provenance import provenance
 
-FILMED = ("joint", "erj", "task-nearest", "task-posture")  # as far as the grid has them
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True)
@@ -32,31 +28,88 @@ class Outcome:
     unfilmed: tuple[str, ...]  # why films and pictures are missing
 
 
-def run(plan: Plan, executor: Executor, progress: Progress, folder: Path, with_films: bool = False) -> Outcome:
+class Experiment(Protocol):
+    """What a kind of experiment consists of, and how it is shown."""
+
+    @property
+    def out(self) -> Path:
+        """Folder of everything that it makes."""
+        ...
+
+    @property
+    def jobs(self) -> Sequence[Job]:
+        """All that its results need, in the order in which they start as far as needs and workers allow."""
+        ...
+
+    @property
+    def targets(self) -> Mapping[Any, Sequence[Job]]:
+        """The jobs of each cell."""
+        ...
+
+    def check(self) -> object:
+        """Check that it can work in its folder.
+
+        Raises:
+            ErIlError: the folder holds something else.
+        """
+        ...
+
+    def claimed(self) -> AbstractContextManager[None]:
+        """Work in its folder alone.
+
+        Raises:
+            ErIlError: another command works in it, or it holds something else.
+        """
+        ...
+
+    def summary(self, cell: Any) -> str:
+        """A complete cell in a line."""
+        ...
+
+    def results(self) -> "tuple[dict[str, Any], pd.DataFrame, Sequence[str]]":
+        """The report of the complete cells, their rollouts in long form, and which columns of these are published."""
+        ...
+
+    def films(self, all_of_them: bool) -> Mapping[str, Sequence[Job]]:
+        """The films of each task that is complete: a telling choice, or all."""
+        ...
+
+    def show(self, task: str, of_task: Sequence[Any], folder: Path, with_films: bool) -> None:
+        """Put pictures of a task's films among the results, and the films themselves if wanted."""
+        ...
+
+    def write_pages(self, folder: Path) -> None:
+        """Write figures and pages from the results."""
+        ...
+
+
+def run(
+    experiment: Experiment, executor: Executor, progress: Progress, folder: Path, with_films: bool = False
+) -> Outcome:
     """Do all jobs that are not done yet; write results, figures, pictures and the page into a folder.
 
     Args:
-        plan: What to do.
+        experiment: What to do.
         executor: Where the jobs run.
         progress: Where to show progress.
         folder: Where the results go.
-        with_films: Film every decoder of the grid, and put the films and the recordings among the results, not only
-            a strip of pictures through some decoders.
+        with_films: Film all that the grid compares, and put the films and the recordings among the results, not only
+            a strip of pictures of some.
 
     Raises:
-        ErIlError: the plan's folder belongs to something else, or another command works in it.
+        ErIlError: the experiment's folder belongs to something else, or another command works in it.
     """
-    with plan.claimed():
-        schedule = Schedule(plan.jobs)
-        _run(schedule, executor, progress, _announcing(plan, schedule, progress))
-        report = write_results(plan, folder)
-        filming = films(plan, plan.grid.decoders if with_films else FILMED)
+    with experiment.claimed():
+        schedule = Schedule(experiment.jobs)
+        _run(schedule, executor, progress, _announcing(experiment, schedule, progress))
+        report = write_results(experiment, folder)
+        filming = experiment.films(with_films)
         recording = Schedule(chain(*filming.values()))
         _run(recording, executor, progress)
         for task, of_task in filming.items():
             if recording.done.issuperset(of_task):
-                show(task, of_task, folder, with_films)
-        write_pages(folder)
+                experiment.show(task, of_task, folder, with_films)
+        experiment.write_pages(folder)
     return Outcome(report, tuple(schedule.failed.values()), tuple(recording.failed.values()))
 
 
@@ -74,50 +127,25 @@ def _run(schedule: Schedule, executor: Executor, progress: Progress, watch: Call
     schedule.run(executor, update)
 
 
-def _announcing(plan: Plan, schedule: Schedule, progress: Progress) -> Callable[[], None]:
+def _announcing(experiment: Experiment, schedule: Schedule, progress: Progress) -> Callable[[], None]:
     """A function that prints the successes of the cells that are complete since its last call, for logs too."""
-    total, waiting = len(plan.targets), dict(plan.targets)
+    total, waiting = len(experiment.targets), dict(experiment.targets)
 
     def announce() -> None:
         for cell in [cell for cell, jobs in waiting.items() if schedule.done.issuperset(jobs)]:
             del waiting[cell]
-            success = plan.rollouts(cell)["success"]
-            text = f"{cell.task} {cell.decoder}, trained on {cell.demonstrations}: {success.sum()}/{len(success)}"
-            text += f" ({total - len(waiting)}/{total} cells)"
+            text = f"{experiment.summary(cell)} ({total - len(waiting)}/{total} cells)"
             progress.console.print(text, highlight=False, soft_wrap=True)
 
     return announce
 
 
-def write_results(plan: Plan, folder: Path) -> dict[str, Any]:
+def write_results(experiment: Experiment, folder: Path) -> dict[str, Any]:
     """Write ``results.json`` and ``episodes.csv.gz`` of all complete cells; return the former."""
-    rollouts = plan.rollouts(*plan.complete)
-    report = {"meta": provenance() | _meta(plan), "cells": report_cells(rollouts)}
+    report, rollouts, columns = experiment.results()
+    report["meta"] = provenance() | report["meta"]
     write_json(folder / RESULTS, report)
     # The same bytes for the same rollouts: neither a name nor a time goes into the header.
-    compressed = gzip.compress(as_csv(rollouts).encode(), mtime=0)
+    compressed = gzip.compress(as_csv(rollouts, columns).encode(), mtime=0)
     write_atomically(folder / EPISODES, lambda path: path.write_bytes(compressed))
     return report
-
-
-def _meta(plan: Plan) -> dict[str, Any]:
-    grid, complete = plan.grid, plan.complete
-    trainings = {plan.training(cell, seed) for cell in grid.cells for seed in grid.training_seeds}
-    trained = [read_json(training.path, ErIlError) for training in trainings if training.done]
-    rollouts = [job for job in plan.jobs if job.done]
-    rolled_out = [load_notes(job.path) for job in rollouts]
-    return {
-        "title": grid.title,
-        "grid": grid.to_dict(),
-        "computed_by": sorted({notes["git"] for notes in (*trained, *rolled_out)}),
-        "training_steps": dict(sorted({(training.space, training.size) for training in trainings})),
-        "mixed_precision": sorted({notes["mixed_precision"] for notes in trained}),
-        "rollout_seeds": f"{FIRST_SEED} to {FIRST_SEED + grid.rollouts - 1}",
-        "costs": {
-            "trainings": len(trained),
-            "training_cpu_s": round(sum(notes["cost"]["cpu"] for notes in trained)),
-            "rollouts": sum(job.size for job in rollouts),
-            "rollout_cpu_s": round(sum(notes["cost"]["cpu"] for notes in rolled_out)),
-        },
-        "missing": [vars(cell) for cell in grid.cells if cell not in complete],
-    }

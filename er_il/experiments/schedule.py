@@ -8,11 +8,13 @@ from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
+from er_il.support.cost import Cost
 from er_il.support.errors import ErIlError
+from er_il.support.provenance import git_sha
 
 POLL = 0.5  # [s] between looks at what runs
 ATTEMPTS = 3  # of a job whose worker died under it
@@ -43,6 +45,11 @@ class Job(ABC):
     @abstractmethod
     def run(self) -> None:
         """Make the result."""
+
+
+def notes(cost: Cost) -> dict[str, Any]:
+    """What results say of how they came about, as JSON."""
+    return {"cost": asdict(cost), "git": git_sha()}
 
 
 class Executor(Protocol):

@@ -19,7 +19,9 @@ from threadpoolctl import threadpool_limits
 
 from er_il.control.commander import BEST_EFFORT
 from er_il.envs.contract import decoder_for, policy_contract
+from er_il.envs.learning import RATE
 from er_il.envs.lerobot_plugin import ErIlEnvConfig
+from er_il.envs.origin import training_info
 from er_il.policy.rows import POLICY_ROWS
 from er_il.support.errors import PolicyError
 
@@ -27,7 +29,7 @@ from er_il.support.errors import PolicyError
 def environment_of(
     policy: Path, task: str, decoder_name: str, on_invalid: str = BEST_EFFORT, posture: Sequence[float] = ()
 ) -> ErIlEnvConfig:
-    """Describe the environment that a policy needs: its arm, its rotation code, its cameras.
+    """Describe the environment that a policy needs: its arm, its rotation code, its cameras, its rate.
 
     Check the policy against the environment that comes of it: :func:`er_il.envs.contract.check_policy`.
     """
@@ -35,8 +37,10 @@ def environment_of(
     chosen = decoder_for(decoder_name, contract)
     images = _load_config(policy).image_features
     sizes = {feature.shape[-1] for feature in images.values()}
+    info = training_info(policy)
     return ErIlEnvConfig(
         task=task,
+        fps=RATE if info and info["fps"] == RATE else ErIlEnvConfig.fps,  # an agent demonstrated
         action_space=chosen.space,
         resolution=chosen.resolution,
         posture=list(posture),
@@ -61,7 +65,7 @@ def one_thread() -> Iterator[None]:
 
 
 @contextmanager
-def _loading(policy: Path) -> Iterator[None]:
+def loading(policy: Path) -> Iterator[None]:
     """Tell by the policy's folder what loading its files raises, which is all kinds of errors of LeRobot and torch."""
     try:
         yield
@@ -72,7 +76,7 @@ def _loading(policy: Path) -> Iterator[None]:
         raise PolicyError(f"LeRobot cannot load the policy {policy} ({type(error).__name__}): {said}") from error
 
 
-def _check_weights(policy: PreTrainedPolicy, path: Path) -> None:
+def check_weights(policy: PreTrainedPolicy, path: Path) -> None:
     """Raise a RuntimeError where the file of the weights is not of this policy: LeRobot leaves what it lacks random."""
     own = type(policy)
     loads_as_others = own.from_pretrained.__func__ is PreTrainedPolicy.from_pretrained.__func__
@@ -81,7 +85,7 @@ def _check_weights(policy: PreTrainedPolicy, path: Path) -> None:
 
 
 def _load_config(policy: Path) -> PreTrainedConfig:
-    with _loading(policy):
+    with loading(policy):
         config = PreTrainedConfig.from_pretrained(policy)
     config.pretrained_path = policy
     if hasattr(config, "pretrained_backbone_weights"):
@@ -105,12 +109,12 @@ class Actor:
             raise PolicyError(
                 f"The policy {path} does not act in {config.action_space} space: its actions differ in length."
             )
-        with _loading(path), redirect_stdout(io.StringIO()):  # LeRobot announces every file it loads
+        with loading(path), redirect_stdout(io.StringIO()):  # LeRobot announces every file it loads
             policy = make_policy(policy_config, env_cfg=config)
-            _check_weights(policy, path)
+            check_weights(policy, path)
         policy.eval()
         overrides = {"device_processor": {"device": str(policy.config.device)}}
-        with _loading(path):
+        with loading(path):
             preprocess, postprocess = make_pre_post_processors(
                 policy_config, pretrained_path=str(path), preprocessor_overrides=overrides
             )

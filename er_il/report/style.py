@@ -47,6 +47,10 @@ LOOKS = {
     "task-clear": Look("Task (clear)", WINE),
     "task-mean": Look("Task (mean posture)", YELLOW),
     "task-grasp": Look("Task (grasp posture)", GREY),
+    "erj-free": Look("ERJ, free", GREEN, DASHED),
+    "erx-free": Look("ERX, free", BLUE, DASHED),
+    "jailer": Look("JAiLeR", GREY),
+    "jailer-rew": Look("JAiLeR (+rew)", INK),
 }
 
 

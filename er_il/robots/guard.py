@@ -16,9 +16,10 @@ import numpy as np
 from safetensors import safe_open
 
 from er_il.datasets.schema import LEADER_JOINTS, SOURCE_ACTION, SOURCE_JOINTS
-from er_il.envs.contract import Contract, decodes, policy_tags
+from er_il.envs.contract import Contract, decodes, policy_tags, read_policy_config
 from er_il.envs.origin import at_hand, policy_file, training_info
 from er_il.envs.trust import POSTPROCESSOR, read_processor
+from er_il.rl.modes import AGENT
 from er_il.robots.command_line import DECODING_ROBOT, RobotCommand
 from er_il.spaces.joint import JOINT
 from er_il.spaces.spec import ACTION, action_spec
@@ -63,6 +64,11 @@ def check(command: RobotCommand) -> None:
 
 def _check_policy(command: RobotCommand) -> None:
     policy = command.policy
+    if at_hand(policy) and read_policy_config(policy)["type"] == AGENT:
+        raise PolicyError(
+            f"The policy {policy} is an agent of reinforcement learning: it observes what only a simulation knows. "
+            "Record its rollouts (er-il generate TASK --agent), and train a policy on them."
+        )
     space = action_space_of(policy)
     if space in (None, JOINT):
         return

@@ -1,7 +1,7 @@
 """The numbers of an episode as curves: joints, end effector, redundancy, action against measured."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import rerun as rr
@@ -11,6 +11,7 @@ from er_il.evaluation.trace import Array, Trace
 from er_il.kinematics.arm_angle import ArmAngle
 from er_il.kinematics.solver import Status
 from er_il.spaces.action_space import ActionSpace
+from er_il.spaces.delta import DeltaBounds, DeltaSpace
 
 JOINTS, END_EFFECTOR, REDUNDANCY, ACTION = GROUPS = ("joints", "end_effector", "redundancy", "action")
 STATUS = "status"
@@ -66,10 +67,17 @@ def curves_of(trace: Trace, space: ActionSpace) -> list[Curve]:
     ]
     if space.arm.angle_frames is not None and space.arm.redundancy:
         curves.append(_arm_angle(trace, space))
-    measured = space.encode(trace.q, trace.gripper)
+    measured = _unbounded(space).encode(trace.q, trace.gripper)
     for name, seen, asked in zip(trace.action_names, measured.T, trace.action.T, strict=True):
         curves.append(Curve(ACTION, name, "", {MEASURED: seen, ACTION: asked}))
     return curves
+
+
+def _unbounded(space: ActionSpace) -> ActionSpace:
+    """The space, of changes without their bounds: an arm that was late may move farther in a step than commanded."""
+    if not isinstance(space.arm_space, DeltaSpace):
+        return space
+    return ActionSpace(replace(space.arm_space, delta_bounds=DeltaBounds(np.inf, np.inf, np.inf)))
 
 
 def _arm_angle(trace: Trace, space: ActionSpace) -> Curve:

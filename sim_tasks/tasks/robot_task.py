@@ -67,6 +67,7 @@ class RobotTask(gym.Env[dict[str, Any], np.ndarray], ABC):
         visualization_height: int = PICTURE[0],
         arm: str,
         rate: int = RATE,
+        max_steps: int | None = None,
         start_range: float = 0.02,
         **leader_settings: Any,
     ) -> None:
@@ -79,7 +80,8 @@ class RobotTask(gym.Env[dict[str, Any], np.ndarray], ABC):
             visualization_width: Width [px] of the pictures of :meth:`render`.
             visualization_height: Height [px] of these.
             arm: Name of the robot, follower and leader.
-            rate: Control rate [Hz]; the step limit is an equal time at every rate.
+            rate: Control rate [Hz].
+            max_steps: Steps after which an episode is truncated; an equal time at every rate if omitted.
             start_range: Each of the joints that ``start`` names starts up to this far [rad] from the start posture.
             leader_settings: Keyword arguments of the task's leader.
 
@@ -94,7 +96,7 @@ class RobotTask(gym.Env[dict[str, Any], np.ndarray], ABC):
             raise UnknownNameError("control rate", rate, map(str, RATES))
         self.rate = rate
         self.metadata = {**self.metadata, "render_fps": rate}  # pyright: ignore[reportIncompatibleVariableOverride, reportAttributeAccessIssue]
-        self.max_steps = registration(self.task).max_steps * rate // RATE
+        self.max_steps = max_steps or registration(self.task).max_steps * rate // RATE
         self.render_mode = render_mode
         self._start_range = span("start_range", start_range)
         self.model = self.world_spec().compile()

@@ -1,0 +1,1 @@
+"""Experiments with agents: reinforcement learning over tasks, action modes and seeds."""

@@ -1,0 +1,125 @@
+"""The experiment with agents: their trainings, assessments and curves."""
+
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from er_il.evaluation.aggregate import interquartile_mean, stratified_interval
+from er_il.evaluation.recording import SUCCESS
+from er_il.evaluation.results import COUNTS, load_notes, report_cells
+from er_il.evaluation.rollout import FIRST_SEED
+from er_il.evaluation.trace import Trace
+from er_il.experiments.agents.grid import AgentCell
+from er_il.experiments.agents.jobs import AssessAgent, FilmAgent
+from er_il.experiments.agents.plan import AgentPlan
+from er_il.experiments.films import PICTURES, STRIP
+from er_il.report.agents_page import write_pages
+from er_il.report.films import Panel, write_strip
+from er_il.report.style import label_of
+from er_il.support.errors import ErIlError
+from er_il.support.json_files import read_json
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+CELL = ("task", "decoder")
+
+
+@dataclass(frozen=True)
+class Learning:
+    """An :class:`er_il.experiments.run.Experiment`."""
+
+    plan: AgentPlan
+
+    @property
+    def out(self) -> Path:
+        return self.plan.out
+
+    @property
+    def jobs(self) -> Sequence[AssessAgent]:
+        return self.plan.jobs
+
+    @property
+    def targets(self) -> Mapping[AgentCell, Sequence[AssessAgent]]:
+        return self.plan.targets
+
+    def check(self) -> object:
+        return self.plan.check()
+
+    def claimed(self) -> AbstractContextManager[None]:
+        return self.plan.claimed()
+
+    def summary(self, cell: AgentCell) -> str:
+        success = self.plan.rollouts(cell).groupby("training_seed")["success"].sum()
+        return f"{cell.task} {cell.name}: {', '.join(map(str, success))} of {self.plan.grid.episodes}"
+
+    def results(self) -> "tuple[dict[str, Any], pd.DataFrame, Sequence[str]]":
+        plan = self.plan
+        complete = plan.complete
+        rollouts = plan.rollouts(*complete)
+        cells = report_cells(rollouts, CELL) if complete else []
+        for cell, report in zip(complete, cells, strict=True):
+            report |= {"mode": cell.mode, "variant": cell.variant, "curve": self._curve(cell)}
+        report = {"meta": self._meta(), "cells": cells, "suite": _suite(cells, list(plan.grid.tasks))}
+        return report, rollouts, ["task", "decoder", "training_seed", *COUNTS]
+
+    def films(self, all_of_them: bool) -> Mapping[str, Sequence[FilmAgent]]:
+        return self.plan.films()
+
+    def show(self, task: str, of_task: Sequence[FilmAgent], folder: Path, with_films: bool) -> None:
+        panels = []
+        for film, cell in zip(of_task, (cell for cell in self.plan.grid.cells if cell.task == task), strict=True):
+            outcome = Trace.load(film.path).outcome
+            panels.append(Panel(label_of(cell.name), outcome.replace("_", " "), outcome == SUCCESS, film.film))
+        write_strip(panels, PICTURES, folder / STRIP.format(task))
+
+    def write_pages(self, folder: Path) -> None:
+        write_pages(folder)
+
+    def _curve(self, cell: AgentCell) -> dict[str, Any]:
+        """Success and invalid actions over the decisions learnt from, seed by seed."""
+        notes = [read_json(job.needs[0].path, ErIlError)["milestones"] for job in self.plan.targets[cell]]
+        return {
+            "steps": [each["steps"] for each in notes[0]],
+            "episodes": notes[0][0]["episodes"],
+            "successes": [[each["successes"] for each in of_seed] for of_seed in notes],
+            "invalid_rates": [[each["invalid_rate"] for each in of_seed] for of_seed in notes],
+        }
+
+    def _meta(self) -> dict[str, Any]:
+        plan, complete = self.plan, self.plan.complete
+        done = [job for job in plan.jobs if job.done]
+        trained = {job.needs[0] for job in plan.jobs if job.needs[0].done}
+        learnt = [read_json(training.path, ErIlError) for training in trained]
+        assessed = [load_notes(job.path) for job in done]
+        return {
+            "title": plan.grid.title,
+            "grid": plan.grid.to_dict(),
+            "settings": plan.settings.to_dict(),
+            "computed_by": sorted({notes["git"] for notes in (*learnt, *assessed)}),
+            "rollout_seeds": f"{FIRST_SEED} to {FIRST_SEED + plan.grid.episodes - 1}",
+            "costs": {
+                "trainings": len(learnt),
+                "training_cpu_s": round(sum(notes["cost"]["cpu"] for notes in learnt)),
+                "rollouts": sum(job.size for job in done),
+                "rollout_cpu_s": round(sum(notes["cost"]["cpu"] for notes in assessed)),
+            },
+            "missing": [{"task": cell.task, "decoder": cell.name} for cell in plan.grid.cells if cell not in complete],
+        }
+
+
+def _suite(cells: Sequence[Mapping[str, Any]], tasks: Sequence[str]) -> list[dict[str, Any]]:
+    """Aggregates over all tasks, of the modes that are complete on each."""
+    suite = []
+    for name in dict.fromkeys(cell["decoder"] for cell in cells):
+        own = {cell["task"]: cell["per_seed"] for cell in cells if cell["decoder"] == name}
+        if set(own) != set(tasks):
+            continue
+        scores = np.array([[seed["successes"] / seed["episodes"] for seed in own[task]] for task in tasks]).T
+        low, high = stratified_interval(scores)
+        suite.append({"decoder": name, "iqm": interquartile_mean(scores), "interval": [low, high]})
+    return suite

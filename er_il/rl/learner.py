@@ -1,0 +1,52 @@
+"""Stable-Baselines3's SAC with er_il's settings, and networks of an actor alone."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium
+from stable_baselines3 import SAC
+from stable_baselines3.common.vec_env import VecEnv
+from stable_baselines3.sac.policies import Actor, SACPolicy
+
+from er_il.rl.pixels import ShiftedExtractor
+from er_il.rl.settings import Settings
+
+
+def make_sac(envs: VecEnv, settings: Settings, seed: int) -> SAC:
+    """SAC for environments side by side.
+
+    Args:
+        envs: Where it is to learn.
+        settings: How.
+        seed: Of its networks and actions; also seeds the global generators of torch and NumPy, which it draws from.
+    """
+    images = isinstance(envs.observation_space, gymnasium.spaces.Dict)
+    return SAC(
+        "MultiInputPolicy" if images else "MlpPolicy",
+        envs,
+        learning_rate=settings.learning_rate,
+        buffer_size=settings.buffer,
+        learning_starts=settings.warm_up,
+        batch_size=settings.batch_size,
+        tau=settings.soft_update,
+        gamma=settings.discount,
+        train_freq=1,
+        gradient_steps=settings.updates,
+        ent_coef=f"auto_{settings.temperature}",
+        policy_kwargs=_network(images, settings.layers, settings.shift),
+        seed=seed,
+        device="auto" if images else "cpu",  # small networks are slower on a GPU
+    )
+
+
+def make_actor(observations: gymnasium.Space[Any], actions: gymnasium.spaces.Box, layers: Sequence[int]) -> Actor:
+    """The network of an actor as SAC has it, untrained."""
+    images = isinstance(observations, gymnasium.spaces.Dict)
+    return SACPolicy(observations, actions, lambda _: 0.0, **_network(images, layers, 0)).actor
+
+
+def _network(images: bool, layers: Sequence[int], shift: int) -> dict[str, Any]:
+    network: dict[str, Any] = {"net_arch": list(layers)}
+    if images:
+        network |= {"features_extractor_class": ShiftedExtractor, "features_extractor_kwargs": {"shift": shift}}
+    return network

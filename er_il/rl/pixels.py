@@ -1,0 +1,34 @@
+"""Features of images and state, with the random shifts of DrQ (Kostrikov et al. 2021, arXiv 2004.13649) in training."""
+
+import gymnasium
+import torch
+from stable_baselines3.common.torch_layers import CombinedExtractor
+from torch.nn import functional
+
+
+class ShiftedExtractor(CombinedExtractor):
+    """Stable-Baselines3's networks for images and vectors; in training each image is shifted by a few pixels."""
+
+    def __init__(self, observation_space: gymnasium.spaces.Dict, shift: int) -> None:
+        """Prepare for shifts of up to ``shift`` pixels along each axis."""
+        super().__init__(observation_space)
+        self._shift = shift
+
+    def forward(self, observations: dict[str, torch.Tensor]) -> torch.Tensor:
+        if self.training and self._shift:
+            observations = {
+                key: shifted(value, self._shift) if value.ndim == 4 else value for key, value in observations.items()
+            }
+        return super().forward(observations)
+
+
+def shifted(images: torch.Tensor, most: int) -> torch.Tensor:
+    """Shift each of images (N, C, H, W) by up to ``most`` pixels along each axis, its border repeated."""
+    count, channels, height, width = images.shape
+    padded = functional.pad(images, (most,) * 4, mode="replicate")
+    top, left = torch.randint(0, 2 * most + 1, (2, count, 1), device=images.device)
+    rows = (top + torch.arange(height, device=images.device))[:, None, :, None]
+    columns = (left + torch.arange(width, device=images.device))[:, None, None, :]
+    image = torch.arange(count, device=images.device)[:, None, None, None]
+    channel = torch.arange(channels, device=images.device)[None, :, None, None]
+    return padded[image, channel, rows, columns]
