@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from tyro.conf import OmitArgPrefixes, Positional, arg
+from tyro.conf import OmitArgPrefixes, Positional, Suppress, arg
 
 from er_il.cli.arm_options import ArmOptions
 
@@ -15,6 +15,8 @@ class SourceArm(ArmOptions):
 
     arm: Annotated[str, arg(name="from")] = ""
     """Preset, or path of a URDF, of the dataset's arm, if the dataset does not say it itself."""
+    from_: Suppress[tuple[str, ...]] = ()  # joints in other columns: er-il encode --to joint puts them together first
+    state_from: Suppress[tuple[str, ...]] = ()
 
 
 def retarget(

@@ -31,6 +31,7 @@ def check_whole(dataset: Dataset) -> None:
     Raises:
         DatasetError: something is missing, damaged, or contradicts the frames; names the file.
     """
+    _ = dataset.info  # raises if it is no dataset of this version
     episodes = _episodes(dataset)
     _check_columns(dataset)
     _check_tasks(dataset)

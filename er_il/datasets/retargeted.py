@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from er_il.datasets.assembled import Assembled
 from er_il.datasets.dataset import Dataset, Floats
 from er_il.datasets.decoding import read_encoded_episodes
 from er_il.datasets.described import read_layout
@@ -29,6 +30,7 @@ from er_il.spaces.registry import make_arm_space
 from er_il.spaces.retargeting import Retargeting
 from er_il.spaces.spec import ACTION
 from er_il.support.atomic_files import atomic_folder, check_absent, check_outside, check_writable
+from er_il.support.errors import DatasetError
 from er_il.support.workers import cores
 
 COMMANDED, MEASURED = "commanded", "measured"
@@ -104,6 +106,11 @@ def retarget(
     dataset = Dataset(find_dataset(source))
     check_whole(dataset)
     dataset, known = read_layout(dataset, wirings, "--from")
+    if isinstance(dataset, Assembled):
+        raise DatasetError(
+            "The arms' joints are in other columns than action and observation.state. Put them together first: "
+            f"er-il encode {source} --to joint --arms … --out OUT"
+        )
     parts = new_parts(known, to)
     exchanges = [(part.motors.joints, parts[part.label].motors.joints) for part in known.parts]
     layout = Layout(exchanged(known.names, exchanges), tuple(parts.values()))
@@ -150,7 +157,7 @@ def retarget(
         info.robot_type = "_".join(part.space.arm.name for part in layout.parts)
         write_info(info, partial)
         name = dataset.root.resolve().name if Path(source).exists() else source  # without its place on this machine
-        card.sign(Dataset(partial), name, {"retargeted": {each.name: each.origin() for each in arms}}, repo_id)
+        card.sign(Dataset(partial), name, {"retargeted": {each.name: each.origin() for each in arms}}, repo_id=repo_id)
     return Retargeted(dataset, known, vectors, tuple(arms))
 
 
