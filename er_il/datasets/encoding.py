@@ -7,7 +7,7 @@ import numpy as np
 
 from er_il.datasets.dataset import Dataset, Floats
 from er_il.datasets.decoding import DecodedEpisode, decode_episodes, read_encoded_episodes
-from er_il.datasets.normalisation import bound_rotation_deviation
+from er_il.datasets.normalisation import normalise_actions
 from er_il.datasets.rewriting import Advance, Column, Copy, rewrite
 from er_il.datasets.schema import LEADER_JOINTS, SOURCE_ACTION, Feature, action_feature
 from er_il.spaces.joint import JOINT
@@ -32,7 +32,7 @@ def encode_dataset(
 
     The joint vectors are those that were recorded, wherever the source holds them. Only the action
     column, its feature and its statistics differ, and they are what LeRobot would have written had
-    the dataset been recorded in that space, but for :func:`er_il.datasets.normalisation.bound_rotation_deviation`. The
+    the dataset been recorded in that space, but for :func:`er_il.datasets.normalisation.normalise_actions`. The
     source stays as it is; the target appears only when complete.
 
     Args:
@@ -58,10 +58,10 @@ def encode_dataset(
     layout = layout.fitted(vectors) if fit else layout
     with atomic_folder(target) as partial:
         copies = {}
-        if keep and column == ACTION and layout.kind != JOINT:
+        if keep and column == ACTION and layout.commands != JOINT:
             copies[SOURCE_ACTION] = Copy(_kept(source.features[ACTION], layout), ACTION)
         rewrite(source, partial, {ACTION: _encoded(source, layout, vectors)}, copies, advance)
-        bound_rotation_deviation(partial)
+        normalise_actions(partial)
         finish(partial)
 
 
@@ -90,7 +90,7 @@ def decode_dataset(
         decoded = decode_episodes(encoded_by, read_encoded_episodes(source, encoded_by), cores(), advance)
         vectors = np.concatenate([episode.vectors for episode in decoded]).astype(np.float32)
         rewrite(source, partial, {ACTION: _encoded(source, layout.fitted(vectors), vectors)}, {})
-        bound_rotation_deviation(partial)
+        normalise_actions(partial)
         finish(partial)
     return decoded
 

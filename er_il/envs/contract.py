@@ -26,6 +26,7 @@ from er_il.envs.trust import POSTPROCESSOR, check_steps, read_processor
 from er_il.kinematics.linear_coordinates import SPEC_KEY
 from er_il.kinematics.rotation import Quaternion
 from er_il.spaces.base import ArmSpace
+from er_il.spaces.chunk import commands_of
 from er_il.spaces.layout import Layout
 from er_il.spaces.registry import AND, AT, ERX, weights_text
 from er_il.spaces.spec import action_spec
@@ -54,7 +55,7 @@ class Contract:
     def of_spec(cls, spec: Mapping[str, Any]) -> "Contract":
         """Return the contract of the specification of an action space, or of a layout."""
         if "arms" in spec:
-            return cls._of_arms(spec["arms"])
+            return replace(cls._of_arms(spec["arms"]), space=spec["space"])
         arm, rotation = spec["arm"], spec.get("rotation", NONE)
         if SPEC_KEY in spec:
             return cls(spec["space"], arm["name"], arm["ee_frame"], rotation, weights_text(spec[SPEC_KEY]["weights"]))
@@ -127,8 +128,8 @@ def decoder_for(name: str, contract: Contract) -> Decoder:
     """
     chosen = decoder(name)
     alone = contract.arm in PRESETS  # several arms have the weights of their presets
-    weighed = alone and chosen.space == contract.space == ERX
-    return replace(chosen, space=ERX + AT + contract.redundant) if weighed else chosen
+    weighed = alone and chosen.space == contract.space and commands_of(chosen.space) == ERX
+    return replace(chosen, space=chosen.space + AT + contract.redundant) if weighed else chosen
 
 
 def check_policy(policy: str | Path, space: ArmSpace | Layout, trust: bool = False) -> None:

@@ -33,7 +33,7 @@ class ErIlEnvConfig(EnvConfig):
             ``era@stereo`` with another reference of the arm angle; with ``delta_`` in front, changes of its commands.
         resolution: What IK does with the freedom that task space leaves: ``nearest``, ``posture`` or ``clear``.
         posture: Joint angles [rad] to which ``posture`` pulls; the arm's comfortable ones if empty.
-        rotation: ``quat`` or ``rot6d``, as in the dataset that the policy was trained on.
+        rotation: ``quat``, ``rot6d`` or ``rot6d_rows``, as in the dataset that the policy was trained on.
         arm: Name of the arm, or of a robot of several, such as ``openarm_v2``.
         on_invalid: What the arm does with an invalid action: ``best_effort``, ``hold``, ``stop``.
         cameras: Cameras that the policy sees, none for a state-based policy.
