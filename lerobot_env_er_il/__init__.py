@@ -8,8 +8,10 @@ import sys
 import er_il.envs.lerobot_plugin  # --env.type=er_il
 import er_il.robots.hardware  # --robot.type=er_il_arm, er_il_sim; --teleop.type=er_il_scripted_leader
 import er_il.robots.processors  # noqa: F401  the decoding steps of policies and pipelines
+from er_il.policy import chunk_pipelines
 from er_il.robots.guard import check_command
 from er_il.support.uncaught import tell_uncaught_in_one_line
 
 tell_uncaught_in_one_line()
+chunk_pipelines.install()  # lerobot-train on chunk-relative datasets
 check_command(sys.argv[1:])

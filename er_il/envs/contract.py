@@ -39,6 +39,8 @@ NONE = "-"
 
 # Name of the post-processing step that `er-il attach` gives a policy, to decode for a robot by itself.
 DECODE_POLICY_ACTION = "er_il_decode_policy_action"
+# The pair of steps of a policy that acts chunk-relative (:mod:`er_il.policy.chunk_steps`).
+RELATIVE_ACTIONS, ABSOLUTE_ACTIONS = "er_il_relative_actions", "er_il_absolute_actions"
 
 
 @dataclass(frozen=True)
@@ -194,10 +196,26 @@ def decodes(policy: str | Path) -> bool:
     Raises:
         PolicyError: its post-processor is damaged, or the Hub has no such policy.
     """
+    return _has_step(policy, DECODE_POLICY_ACTION)
+
+
+def chunk_relative(policy: str | Path) -> bool:
+    """True if a policy's processors make chunk-relative actions absolute.
+
+    Args:
+        policy: Folder of a pretrained policy, or its Hub id.
+
+    Raises:
+        PolicyError: as :func:`decodes`.
+    """
+    return _has_step(policy, ABSOLUTE_ACTIONS)
+
+
+def _has_step(policy: str | Path, name: str) -> bool:
     path = policy_file(policy, POSTPROCESSOR)
     if path is None:
         return False  # LeRobot says what is missing
-    return any(step.get("registry_name") == DECODE_POLICY_ACTION for step in read_processor(path)["steps"])
+    return any(step.get("registry_name") == name for step in read_processor(path)["steps"])
 
 
 def _of_dataset(policy: str | Path) -> Contract | None:

@@ -21,6 +21,7 @@ RESULTS = "results.json"  # the report of a grid, from which everything is rende
 EPISODES = "episodes.csv.gz"
 
 CELL = ["task", "decoder", "demonstrations"]
+WITHIN = "within"  # one more of a cell, in grids that vary where initial states are drawn
 LABELS = [*CELL, "training_seed"]
 COUNTS = ["seed", "success", "failure", "steps", "invalid", "max_joint_step"]
 COLUMNS = [*LABELS, *COUNTS, "elbow_error"]  # of a CSV; in memory there are statuses and latencies, too
@@ -58,23 +59,25 @@ def load_notes(path: Path) -> dict[str, Any]:
 
 
 def long_form(groups: Iterable[tuple[Mapping[str, object], Iterable[Rollout]]]) -> pd.DataFrame:
-    """Return one row a rollout: :data:`COLUMNS`, ``statuses`` and ``latencies``.
+    """Return one row a rollout: :data:`COLUMNS`, :data:`WITHIN` if it is among the labels, ``statuses``, ``latencies``.
 
     Args:
-        groups: Values of :data:`LABELS`, and the rollouts that they hold for.
+        groups: Values of :data:`LABELS`, and of :data:`WITHIN` if it varies, and the rollouts that they hold for.
     """
     rows = [
         {**labels, **vars(each), "steps": each.steps, "invalid": each.invalid, "max_joint_step": each.joint_step}
         for labels, rollouts in groups
         for each in rollouts
     ]
-    columns = pd.Index([*COLUMNS, "statuses", "latencies"])
+    varied = [WITHIN] if any(WITHIN in row for row in rows) else []
+    columns = pd.Index([*varied, *COLUMNS, "statuses", "latencies"])
     return pd.DataFrame(rows, columns=columns).astype({"elbow_error": float})
 
 
-def as_csv(rollouts: pd.DataFrame, columns: Sequence[str] = COLUMNS) -> str:
-    """Return the rollouts as CSV, a row each."""
+def as_csv(rollouts: pd.DataFrame, columns: Sequence[str] = ()) -> str:
+    """Return the rollouts as CSV, a row each, with these columns or all that :func:`long_form` says of a rollout."""
     shown = rollouts.astype({"success": int})
+    columns = columns or [name for name in (WITHIN, *COLUMNS) if name in rollouts]
     return shown.to_csv(columns=list(columns), index=False, float_format="%.6f", lineterminator="\n")
 
 
@@ -111,17 +114,20 @@ def report_cells(rollouts: pd.DataFrame) -> list[dict[str, Any]]:
     Where :data:`REFERENCE` met the same initial states with policies of the same training seeds, the paired
     difference to it stands beside.
     """
-    reference = rollouts.loc[rollouts["decoder"] == REFERENCE, [*LABELS, "seed", "success"]]
+    varied = [WITHIN] if WITHIN in rollouts else []
+    reference = rollouts.loc[rollouts["decoder"] == REFERENCE, [*varied, *LABELS, "seed", "success"]]
     cells = []
-    for key, cell in rollouts.groupby(CELL, sort=False):
-        task, decoder, demonstrations = _labels(key)
+    for key, cell in rollouts.groupby([*CELL, *varied], sort=False):
+        task, decoder, demonstrations, *width = _labels(key)
         report = {"task": task, "decoder": decoder} | summarise(cell) | {"demonstrations": int(demonstrations)}
+        report |= {WITHIN: float(each) for each in width}
         per_seed = {seed: summarise(part) for seed, part in cell.groupby("training_seed", sort=False)}
         report["per_seed"] = [
             {"training_seed": int(str(seed))} | {name: each[name] for name in ("successes", "episodes", "interval")}
             for seed, each in per_seed.items()
         ]
-        paired = cell.merge(reference, on=["task", "demonstrations", "training_seed", "seed"], suffixes=("", "_theirs"))
+        same = ["task", "demonstrations", *varied, "training_seed", "seed"]
+        paired = cell.merge(reference, on=same, suffixes=("", "_theirs"))
         if decoder != REFERENCE and len(paired):
             difference, low, high = paired_difference(paired["success"].tolist(), paired["success_theirs"].tolist())
             report[f"difference_to_{REFERENCE}"] = {"difference": difference, "interval": [low, high]}

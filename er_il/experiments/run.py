@@ -82,7 +82,8 @@ def _announcing(plan: Plan, schedule: Schedule, progress: Progress) -> Callable[
         for cell in [cell for cell, jobs in waiting.items() if schedule.done.issuperset(jobs)]:
             del waiting[cell]
             success = plan.rollouts(cell)["success"]
-            text = f"{cell.task} {cell.decoder}, trained on {cell.demonstrations}: {success.sum()}/{len(success)}"
+            start = "" if cell.within is None else f", within {cell.within:g} m"
+            text = f"{cell.task} {cell.decoder}, trained on {cell.demonstrations}{start}: {success.sum()}/{len(success)}"
             text += f" ({total - len(waiting)}/{total} cells)"
             progress.console.print(text, highlight=False, soft_wrap=True)
 
@@ -119,5 +120,5 @@ def _meta(plan: Plan) -> dict[str, Any]:
             "rollouts": sum(job.size for job in rollouts),
             "rollout_cpu_s": round(sum(notes["cost"]["cpu"] for notes in rolled_out)),
         },
-        "missing": [vars(cell) for cell in grid.cells if cell not in complete],
+        "missing": [cell.labels for cell in grid.cells if cell not in complete],
     }

@@ -47,6 +47,12 @@ LOOKS = {
     "task-clear": Look("Task (clear)", WINE),
     "task-mean": Look("Task (mean posture)", YELLOW),
     "task-grasp": Look("Task (grasp posture)", GREY),
+    # Chunk-relative forms: the same hue, darker, and dashed where lines are drawn.
+    "rel_joint": Look("Relative joint", "#1F78B4", DASHED),
+    "rel_erj": Look("Relative ERJ", "#00573F", DASHED),
+    "rel_era": Look("Relative ERA", "#7A3F63", DASHED),
+    "rel_erx": Look("Relative ERX", "#003A5C", DASHED),
+    "rel_task-nearest": Look("Relative task (nearest)", "#8A5F00", DASHED),
 }
 
 
