@@ -236,7 +236,9 @@ def test_the_statistics_are_those_of_the_chunks(reach_cup: Path, tmp_path: Path)
         assert own[name] == pytest.approx(expected, abs=3e-2 if name == "q50" else 2e-4), name
     assert own["count"] == [len(samples)]
     before = json.loads((reach_cup / "erj/meta/stats.json").read_text())
-    assert {key: stats[key] for key in stats if key != "action"} == {key: before[key] for key in before if key != "action"}
+    assert {key: stats[key] for key in stats if key != "action"} == {
+        key: before[key] for key in before if key != "action"
+    }
     # LeRobot's edits aggregate the statistics of episodes.
     (file,) = (tmp_path / "rel/meta/episodes").rglob("*.parquet")
     episodes = pd.read_parquet(file)

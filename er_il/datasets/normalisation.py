@@ -65,7 +65,9 @@ def normalise_actions(root: Path) -> None:
             for number, rows in dataset.episodes.items()
         }
         features = dataset.features
-        replace_statistics(root, {key: compute_episode_stats({ACTION: each}, features) for key, each in samples.items()})
+        replace_statistics(
+            root, {key: compute_episode_stats({ACTION: each}, features) for key, each in samples.items()}
+        )
     _bound_rotation_deviation(root)
 
 
@@ -81,7 +83,9 @@ def _bound_rotation_deviation(root: Path) -> None:
     """
     stats = load_stats(root) or {}
     names = Dataset(root).names(ACTION)
-    rotations = np.array([name.endswith((*Quaternion.names, *Rot6d.names, *Rot6dRows.names)) for name in names])  # of any arm
+    rotations = np.array(
+        [name.endswith((*Quaternion.names, *Rot6d.names, *Rot6dRows.names)) for name in names]
+    )  # of any arm
     stats[ACTION] |= {"std": np.maximum(stats[ACTION]["std"], LEAST_ROTATION * rotations)}
     _write(stats, root)
 

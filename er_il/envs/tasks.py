@@ -42,7 +42,10 @@ def takes_option(name: str, option: str) -> bool:
     creator = gymnasium.registry[task_id(name)].entry_point
     if isinstance(creator, str):
         creator = load_env_creator(creator)
-    return creator is not None and option in inspect.signature(creator).parameters
+    # Classes pass on what their bases take.
+    return any(
+        option in inspect.signature(each).parameters for each in getattr(creator, "__mro__", (creator, object))[:-1]
+    )
 
 
 @cache

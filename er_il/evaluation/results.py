@@ -120,7 +120,8 @@ def report_cells(rollouts: pd.DataFrame) -> list[dict[str, Any]]:
     for key, cell in rollouts.groupby([*CELL, *varied], sort=False):
         task, decoder, demonstrations, *width = _labels(key)
         report = {"task": task, "decoder": decoder} | summarise(cell) | {"demonstrations": int(demonstrations)}
-        report |= {WITHIN: float(each) for each in width}
+        if width:
+            report[WITHIN] = float(width[0])
         per_seed = {seed: summarise(part) for seed, part in cell.groupby("training_seed", sort=False)}
         report["per_seed"] = [
             {"training_seed": int(str(seed))} | {name: each[name] for name in ("successes", "episodes", "interval")}

@@ -33,7 +33,9 @@ def films(plan: Plan, decoders: Sequence[str]) -> dict[str, list[Film]]:
             start = f"start-{seed}" if width is None else f"start-{seed}-within-{width:g}"
             folder = plan.out / "films" / task / f"{trainings[0].path.stem}-{start}"
             found[task] = [
-                Film(folder / f"{name}.npz", f"film {task} through {name} from {seed}", (trained,), 1, name, seed, width)
+                Film(
+                    folder / f"{name}.npz", f"film {task} through {name} from {seed}", (trained,), 1, name, seed, width
+                )
                 for name, trained in zip(names, trainings, strict=True)
             ]
     return found

@@ -83,7 +83,9 @@ def _announcing(plan: Plan, schedule: Schedule, progress: Progress) -> Callable[
             del waiting[cell]
             success = plan.rollouts(cell)["success"]
             start = "" if cell.within is None else f", within {cell.within:g} m"
-            text = f"{cell.task} {cell.decoder}, trained on {cell.demonstrations}{start}: {success.sum()}/{len(success)}"
+            text = (
+                f"{cell.task} {cell.decoder}, trained on {cell.demonstrations}{start}: {success.sum()}/{len(success)}"
+            )
             text += f" ({total - len(waiting)}/{total} cells)"
             progress.console.print(text, highlight=False, soft_wrap=True)
 

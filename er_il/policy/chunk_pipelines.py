@@ -1,9 +1,9 @@
 """Policies that are trained on a chunk-relative dataset get the steps that convert, whatever their type.
 
-LeRobot's training builds a policy's pre- and post-processor from its type, and loads those of a pretrained one; neither way
-has room for another step. So its function is replaced, in every module of this process that has imported it: with er_il
-installed, the stock ``lerobot-train`` trains chunk-relative policies, and saves the steps with them. Loading needs no
-replacement, only that the steps are registered.
+LeRobot's training builds a policy's pre- and post-processor from its type, or loads those of a pretrained one, and
+has no room for another step. So its function is replaced in every module of this process that has imported it: with
+er_il installed, the stock ``lerobot-train`` trains chunk-relative policies, and saves the steps with them. Loading
+needs no replacement, only that the steps are registered.
 """
 
 import sys
@@ -79,7 +79,9 @@ def insert_steps(
     """
     normalise, unnormalise = _index(pre, NormalizerProcessorStep), _index(post, UnnormalizerProcessorStep)
     if normalise is None or unnormalise is None:
-        raise PolicyError(f"Policies of the type {policy_type} normalise actions in their own way, not chunk-relative ones.")
+        raise PolicyError(
+            f"Policies of the type {policy_type} normalise actions in their own way, not chunk-relative ones."
+        )
     relative = RelativeActionsStep(spec=spec, state_names=list(state_names))
     renamed = _index(pre, RenameObservationsProcessorStep)
     pre.steps = _inserted(pre.steps, 0 if renamed is None else renamed + 1, relative)
@@ -102,7 +104,9 @@ def _is_relative(pipeline: PolicyProcessorPipeline[Any, Any]) -> bool:
 def _check_chunk(config: PreTrainedConfig, chunk: int) -> None:
     seen = config.observation_delta_indices
     if seen is not None and seen[-1] != 0:
-        raise PolicyError(f"Policies of the type {config.type} see future states; chunk-relative actions count from the present.")
+        raise PolicyError(
+            f"Policies of the type {config.type} see future states; chunk-relative actions count from the present."
+        )
     if getattr(config, "use_relative_actions", False):
         raise PolicyError("The dataset's actions are made relative by er_il: leave out --policy.use_relative_actions.")
     length = max(config.action_delta_indices or [0]) + 1

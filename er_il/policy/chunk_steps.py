@@ -1,13 +1,13 @@
 """The pair of processor steps that make actions relative to the state for a policy, and absolute again.
 
-LeRobot's own pair (``relative_actions_processor``) subtracts the state from the action index by index, and adds the state of
-each step to the actions of a chunk that was predicted before it. This pair derives from it, because LeRobot connects the
-two when it loads a policy, and keeps the raw state. It converts on SE(3), and every action of a chunk counts from the state
-from which the chunk was predicted, also when the policy hands the actions out one a step.
+LeRobot's own pair (``relative_actions_processor``) subtracts the state from the action index by index, and adds the
+state of each step to the actions of a chunk that was predicted before it. This pair derives from it, because LeRobot
+connects the two when it loads a policy, and keeps the raw state. It converts on SE(3), and every action of a chunk
+counts from the state from which the chunk was predicted, also when the policy hands the actions out one a step.
 
-Neither a processor nor a configuration knows when that was: a policy's queue refills by rules of its own, and LeRobot resets
-policies without their processors. PyTorch knows: a chunk is predicted when a module runs between the observation's
-pre-processing and the action's post-processing.
+Neither a processor nor a configuration knows when that was: a policy's queue refills by rules of its own, and LeRobot
+resets policies without their processors. PyTorch knows: a chunk is predicted when a module runs between the
+observation's pre-processing and the action's post-processing.
 """
 
 from dataclasses import dataclass, field
@@ -96,7 +96,7 @@ class RelativeActionsStep(RelativeActionsProcessorStep):
         self._anchor, self._age = self._states(), 0
 
     def _states(self) -> Array:
-        """The latest states (B, S): of several in a row, as Diffusion sees them, the last, at which the chunk starts."""
+        """The latest states (B, S): of several in a row, which Diffusion sees, the last, at which the chunk starts."""
         state = self.get_cached_state()
         if state is None:
             raise PolicyError("There is no observation.state, from which chunk-relative actions count.")
@@ -126,7 +126,8 @@ class AbsoluteActionsStep(AbsoluteActionsProcessorStep):
         step = self.relative_step
         if not isinstance(step, RelativeActionsStep):
             raise PolicyError(
-                f"The policy's post-processor has the step {ABSOLUTE_ACTIONS}, whose pre-processor lacks {RELATIVE_ACTIONS}."
+                f"The policy's post-processor has the step {ABSOLUTE_ACTIONS}, but its pre-processor lacks "
+                f"{RELATIVE_ACTIONS}."
             )
         absolute = step.convert.absolute(_chunks(action), step.anchor)
         return {**transition, TransitionKey.ACTION.value: _like(absolute, action)}  # pyright: ignore[reportReturnType]

@@ -66,9 +66,9 @@ def make_arm_space(
     """Build the action space of an arm, without a gripper, by name.
 
     Args:
-        name: ``joint``, ``task``, ``erj``, ``era`` or ``erx``; with ``rel_`` in front, the same commands, which policies
-            see relative to the state (:mod:`er_il.spaces.relative`). With ``delta_``, changes of its commands, and with
-            ``carried_`` such that the pose's target moves along with ERJ's joint or ERX's coordinates
+        name: ``joint``, ``task``, ``erj``, ``era`` or ``erx``; with ``rel_`` in front, the same commands, which
+            policies see relative to the state (:mod:`er_il.spaces.relative`). With ``delta_``, changes of its commands,
+            and with ``carried_`` such that the pose's target moves along with ERJ's joint or ERX's coordinates
             (:mod:`er_il.spaces.carried`). ``erj@<joint>`` commands another than the arm's default joint; several are
             joined by ``+``. ``era@stereo`` counts the arm angle from the stereographic reference. ``erx@<weights>`` has
             other weights than the arm's (:func:`erx_name`).

@@ -79,7 +79,10 @@ class RelativeActions:
         return [
             (
                 part,
-                [names.index(name) for name in (part.names if isinstance(part.space, PoseSpace) else part.motors.joints)],
+                [
+                    names.index(name)
+                    for name in (part.names if isinstance(part.space, PoseSpace) else part.motors.joints)
+                ],
                 [self.state_names.index(name) for name in part.motors.measured],
             )
             for part in self.layout.parts
@@ -160,4 +163,3 @@ def relative_samples(convert: RelativeActions, actions: Array, states: Array) ->
     rows = np.arange(count)[:, None] + np.arange(chunk)
     chunks = convert.relative(actions[np.minimum(rows, count - 1)], states)
     return chunks[rows < count]
-
