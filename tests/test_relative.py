@@ -139,7 +139,7 @@ def test_what_is_no_number_or_no_rotation_stays_within_its_action(rotation: str)
 
 
 def test_rot6d_by_rows_is_the_first_two_rows() -> None:
-    R = Rotation.random(6, rng=2).as_matrix().reshape(2, 3, 3, 3)
+    R = Rotation.random(6, np.random.default_rng(2)).as_matrix().reshape(2, 3, 3, 3)
     by_rows, by_columns = Rot6dRows(), Rot6d()
     assert (by_rows.encode(R)[1, 2] == [*R[1, 2, 0], *R[1, 2, 1]]).all()
     assert (by_rows.encode(R) == by_columns.encode(R.swapaxes(-2, -1))).all()

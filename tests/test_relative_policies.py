@@ -73,6 +73,12 @@ def steps() -> tuple[RelativeActionsStep, AbsoluteActionsStep]:
     return relative, AbsoluteActionsStep(relative_step=relative)
 
 
+def the_step[S: ProcessorStep](pipeline: PolicyProcessorPipeline[Any, Any], kind: type[S]) -> S:
+    """The only step of a kind."""
+    (found,) = (step for step in pipeline.steps if isinstance(step, kind))
+    return found
+
+
 def random_states(count: int) -> np.ndarray:
     """States (count, 8) that differ."""
     return np.append(PANDA.home, 1.0) + 0.1 * np.random.default_rng(5).uniform(-1, 1, (count, 8))
@@ -157,6 +163,7 @@ def test_vision_language_action_policies_get_the_steps(
     seen = pre(batch)
     of_dataset = RelativeActions(Dataset(root).layout, Dataset(root).names(STATE))
     relative = of_dataset.relative(batch["action"].numpy(), batch[STATE].numpy())
+    assert meta.stats
     mean, deviation = (np.asarray(meta.stats["action"][name]) for name in ("mean", "std"))
     np.testing.assert_allclose(seen["action"], (relative - mean) / deviation, atol=1e-3)
     assert seen["action"].abs().max() < 10  # of the chunks' own statistics
@@ -166,7 +173,8 @@ def test_vision_language_action_policies_get_the_steps(
 
 
 def config_of(root: Path, **changes: Any) -> ACTConfig:
-    config = ACTConfig(device="cpu", **{"chunk_size": CHUNK, "n_action_steps": 5} | changes)
+    settings: dict[str, Any] = {"chunk_size": CHUNK, "n_action_steps": 5} | changes
+    config = ACTConfig(device="cpu", **settings)
     config._runtime_dataset_meta = LeRobotDatasetMetadata("me/rel", root=root)  # pyright: ignore[reportAttributeAccessIssue]
     return config
 
@@ -217,9 +225,7 @@ def test_the_steps_are_saved_and_loaded_by_lerobot_itself(trained: Path) -> None
     assert saved["pre"].count(RELATIVE_ACTIONS) == saved["post"].count(ABSOLUTE_ACTIONS) == 1  # also after a resume
     config = ACTConfig.from_pretrained(trained)
     pre, post = chunk_pipelines._STOCK(config, pretrained_path=str(trained))
-    (relative,) = [step for step in pre.steps if isinstance(step, RelativeActionsStep)]
-    (absolute,) = [step for step in post.steps if isinstance(step, AbsoluteActionsStep)]
-    assert absolute.relative_step is relative
+    assert the_step(post, AbsoluteActionsStep).relative_step is the_step(pre, RelativeActionsStep)
     config.n_action_steps, config.temporal_ensemble_coeff = 1, 0.01  # pyright: ignore[reportAttributeAccessIssue]
     assert factory.make_pre_post_processors is make_pre_post_processors
     with pytest.raises(PolicyError, match="averages actions of several chunks"):
@@ -301,7 +307,7 @@ def test_diffusion_trains_and_its_chunks_count_from_where_they_were_predicted(
     policy = DiffusionPolicy.from_pretrained(path)
     policy.eval()
     pre, post = factory.make_pre_post_processors(policy.config, pretrained_path=str(path))
-    (relative,) = [step for step in pre.steps if isinstance(step, RelativeActionsStep)]
+    relative = the_step(pre, RelativeActionsStep)
     states, poses = Dataset(dataset).vectors(STATE)[:10], torch.zeros(1, 7)
     taken, anchors = policy.config.n_action_steps, []
     for state in states:

@@ -8,6 +8,7 @@ import inspect
 import re
 from functools import cache
 from importlib.metadata import entry_points
+from typing import Any
 
 import gymnasium
 from gymnasium.envs.registration import load_env_creator
@@ -39,7 +40,7 @@ def task_id(name: str) -> str:
 
 def takes_option(name: str, option: str) -> bool:
     """True if the environment of a task takes a keyword argument of its own."""
-    creator = gymnasium.registry[task_id(name)].entry_point
+    creator: Any = gymnasium.registry[task_id(name)].entry_point
     if isinstance(creator, str):
         creator = load_env_creator(creator)
     # Classes pass on what their bases take.

@@ -20,6 +20,7 @@ from er_il.spaces.pose import POSITION_NAMES, PoseSpace
 from er_il.support.errors import ErIlError, ShapeError
 
 Array = NDArray[np.float64]
+Floats = NDArray[np.floating]
 
 _XYZ = slice(len(POSITION_NAMES))
 
@@ -117,7 +118,7 @@ def relative_code(rotation: RotationCode) -> RotationCode:
 
 def _present(space: PoseSpace, q: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Poses (B, 4, 4) and redundancy values (B, m) at q (B, n) [rad], and a mask (B,) of those that are finite."""
-    finite = np.isfinite(q).all(axis=1)
+    finite: NDArray[np.bool_] = np.all(np.isfinite(q), axis=1)  # pyright: ignore[reportAssignmentType]
     known = np.where(finite[:, None], q, space.arm.home)
     return space.kinematics.fk_batch(known), space.redundancy_along(known), finite
 
@@ -148,7 +149,7 @@ def _end(space: PoseSpace) -> int:
     return len(POSITION_NAMES) + len(space.rotation.names)
 
 
-def relative_samples(convert: RelativeActions, actions: Array, states: Array) -> Array:
+def relative_samples(convert: RelativeActions, actions: Floats, states: Floats) -> Array:
     """All actions (N, E) of all chunks of an episode, relative to their states: what its statistics are over.
 
     LeRobot fills a chunk that reaches beyond an episode's end with its last action, and masks those in the loss of
