@@ -68,10 +68,10 @@ def normalise_actions(root: Path) -> None:
         replace_statistics(
             root, {key: compute_episode_stats({ACTION: each}, features) for key, each in samples.items()}
         )
-    _bound_rotation_deviation(root)
+    bound_rotation_deviation(root)
 
 
-def _bound_rotation_deviation(root: Path) -> None:
+def bound_rotation_deviation(root: Path) -> None:
     """Set a lower bound on the standard deviation by which ``configs/`` normalise the rotations of actions.
 
     Actions are scaled by their standard deviation, and a policy's errors count by it. Where the hand keeps its

@@ -102,7 +102,9 @@ class Plan:
         if commands_of(space) != ERX:
             return demonstrated
         path = self.out / "fitted" / cell.task / f"{space}-{count}-demonstrations"
-        return FitWeights(path, f"fit {space} to {count} demonstrations of {cell.task}", (demonstrated,), 1, space, count)
+        return FitWeights(
+            path, f"fit {space} to {count} demonstrations of {cell.task}", (demonstrated,), 1, space, count
+        )
 
     def training(self, cell: Cell, seed: int) -> Train:
         """The training of a cell's policy."""
