@@ -232,6 +232,13 @@ def test_the_steps_are_saved_and_loaded_by_lerobot_itself(trained: Path) -> None
         factory.make_pre_post_processors(config, pretrained_path=str(trained))
 
 
+def test_fine_tuning_on_other_actions_is_refused(trained: Path, dataset: Path, reach_cup: Path) -> None:
+    pre, _ = make_pre_post_processors(config_of(dataset), pretrained_path=str(trained))
+    assert the_step(pre, RelativeActionsStep).convert.layout.chunk == CHUNK
+    with pytest.raises(PolicyError, match="trained for other chunk-relative actions than the dataset's"):
+        make_pre_post_processors(config_of(reach_cup / "erj"), pretrained_path=str(trained))
+
+
 def leader_actions(seed: int) -> np.ndarray:
     """The demonstration (T, 9) of a seed's world in ERJ."""
     env = gymnasium.make(task_id("reach_cup"))

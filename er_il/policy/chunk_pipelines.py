@@ -44,17 +44,33 @@ def make_pre_post_processors(policy_cfg: PreTrainedConfig, *args: Any, **kwargs:
     """Make a policy's pipelines as LeRobot does; with the steps of chunk-relative actions, if its dataset has such.
 
     Raises:
-        PolicyError: a policy of these settings cannot act chunk-relative.
+        PolicyError: a policy of these settings cannot act chunk-relative, or was trained to for other actions.
     """
     pre, post = _STOCK(policy_cfg, *args, **kwargs)
     meta = getattr(policy_cfg, "_runtime_dataset_meta", None)  # of the dataset in training
-    if isinstance(meta, LeRobotDatasetMetadata) and (spec := _relative_spec(meta)):
-        _check_chunk(policy_cfg, Layout.from_spec(spec).chunk)
-        if not _is_relative(pre):
-            insert_steps(policy_cfg.type, pre, post, spec, dimension_names(meta.features.get(STATE, {"shape": [0]})))
-    if _is_relative(pre):
+    if isinstance(meta, LeRobotDatasetMetadata):
+        _adapt(policy_cfg, meta, pre, post)
+    if _relative_step(pre):
         _check_ensembling(policy_cfg)
     return pre, post
+
+
+def _adapt(
+    config: PreTrainedConfig,
+    meta: LeRobotDatasetMetadata,
+    pre: PolicyProcessorPipeline[Any, Any],
+    post: PolicyProcessorPipeline[Any, Any],
+) -> None:
+    """Let pipelines convert the actions of the dataset that is trained on, if they are chunk-relative."""
+    spec, step = _relative_spec(meta), _relative_step(pre)
+    if step and step.spec != spec:
+        raise PolicyError(
+            "The policy was trained for other chunk-relative actions than the dataset's; train one of its own."
+        )
+    if spec:
+        _check_chunk(config, Layout.from_spec(spec).chunk)
+        if not step:
+            insert_steps(config.type, pre, post, spec, dimension_names(meta.features.get(STATE, {"shape": [0]})))
 
 
 def insert_steps(
@@ -97,8 +113,8 @@ def _relative_spec(meta: LeRobotDatasetMetadata) -> dict[str, Any] | None:
     return spec if "chunk" in spec else None
 
 
-def _is_relative(pipeline: PolicyProcessorPipeline[Any, Any]) -> bool:
-    return _index(pipeline, RelativeActionsStep) is not None
+def _relative_step(pipeline: PolicyProcessorPipeline[Any, Any]) -> RelativeActionsStep | None:
+    return next((step for step in pipeline.steps if isinstance(step, RelativeActionsStep)), None)
 
 
 def _check_chunk(config: PreTrainedConfig, chunk: int) -> None:
