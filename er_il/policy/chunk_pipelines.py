@@ -36,7 +36,7 @@ _NAME = _STOCK.__name__
 def install() -> None:
     """Let LeRobot's commands in this process make the pipelines by :func:`make_pre_post_processors`."""
     for module in list(sys.modules.values()):
-        if getattr(module, "__dict__", {}).get(_NAME) is _STOCK and module is not sys.modules[__name__]:
+        if getattr(module, "__dict__", {}).get(_NAME) is _STOCK:
             setattr(module, _NAME, make_pre_post_processors)
 
 
