@@ -50,7 +50,7 @@ def make_pre_post_processors(policy_cfg: PreTrainedConfig, *args: Any, **kwargs:
     meta = getattr(policy_cfg, "_runtime_dataset_meta", None)  # of the dataset in training
     if isinstance(meta, LeRobotDatasetMetadata):
         _adapt(policy_cfg, meta, pre, post)
-    if _relative_step(pre):
+    if _first(pre, RelativeActionsStep):
         _check_ensembling(policy_cfg)
     return pre, post
 
@@ -62,7 +62,7 @@ def _adapt(
     post: PolicyProcessorPipeline[Any, Any],
 ) -> None:
     """Let pipelines convert the actions of the dataset that is trained on, if they are chunk-relative."""
-    spec, step = _relative_spec(meta), _relative_step(pre)
+    spec, step = _relative_spec(meta), _first(pre, RelativeActionsStep)
     if step and step.spec != spec:
         raise PolicyError(
             "The policy was trained for other chunk-relative actions than the dataset's; train one of its own."
@@ -113,8 +113,8 @@ def _relative_spec(meta: LeRobotDatasetMetadata) -> dict[str, Any] | None:
     return spec if "chunk" in spec else None
 
 
-def _relative_step(pipeline: PolicyProcessorPipeline[Any, Any]) -> RelativeActionsStep | None:
-    return next((step for step in pipeline.steps if isinstance(step, RelativeActionsStep)), None)
+def _first[S: ProcessorStep](pipeline: PolicyProcessorPipeline[Any, Any], kind: type[S]) -> S | None:
+    return next((step for step in pipeline.steps if isinstance(step, kind)), None)
 
 
 def _check_chunk(config: PreTrainedConfig, chunk: int) -> None:
