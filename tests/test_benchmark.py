@@ -4,7 +4,7 @@ import csv
 import gzip
 import json
 from collections import Counter
-from contextlib import nullcontext
+from contextlib import closing, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +18,10 @@ from matplotlib.image import imread
 
 from er_il.arms.arm import Arm
 from er_il.cli.benchmark import benchmark
+from er_il.envs.lerobot_plugin import ErIlEnvConfig
 from er_il.evaluation.elbow import ElbowReference
 from er_il.evaluation.posture_baselines import grasp_posture, mean_posture
-from er_il.evaluation.results import long_form, report_cells
+from er_il.evaluation.results import as_csv, long_form, report_cells
 from er_il.evaluation.rollout import Rollout
 from er_il.experiments.films import telling_seed
 from er_il.experiments.grid import Cell, Grid, GridError
@@ -90,6 +91,12 @@ def test_mistakes_in_a_grid_name_the_valid_choices(tmp_path: Path) -> None:
         grid(cameras={"lift_cup": ["wrist"]})
     with pytest.raises(GridError, match=r"cameras is \['wrist'\]: Input should be a valid dictionary"):
         grid(cameras=["wrist"])
+    with pytest.raises(GridError, match=r"within is for tasks that place a cup: .*reach_cup.*; not for retrieve_bear"):
+        grid(tasks=["retrieve_bear"], within=[0.1])
+    with pytest.raises(GridError, match="varies either demonstrations or within, not both"):
+        grid(demonstrations=[1, 2], episodes=3, within=[0.1])
+    with pytest.raises(GridError, match=r"within.0 is 0.0: Input should be greater than 0"):
+        grid(within=[0.0])
     with pytest.raises(GridError, match="There is no grid"):
         Grid.from_file(tmp_path / "none.yaml")
     (tmp_path / "grid.yaml").write_text(yaml.safe_dump(TINY | {"rollouts": "many"}))
@@ -97,7 +104,7 @@ def test_mistakes_in_a_grid_name_the_valid_choices(tmp_path: Path) -> None:
         Grid.from_file(tmp_path / "grid.yaml")
 
 
-@pytest.mark.parametrize("name", ["demo", "table1", "data_efficiency", "images", "panda8"])
+@pytest.mark.parametrize("name", ["demo", "table1", "data_efficiency", "images", "panda8", "relative", "extrapolation"])
 def test_the_shipped_grids_are_grids(name: str) -> None:
     shipped = Grid.from_file(Path(__file__).parents[1] / "configs" / f"{name}.yaml")
     assert Grid.from_dict(shipped.to_dict()) == shipped
@@ -125,6 +132,58 @@ def test_jobs_differ_wherever_their_results_may(tmp_path: Path) -> None:
     assert [job.decoder for job in jobs if job.needs[0].seed == 1].count("task-mean") == 0  # first seed only
     other = Plan(grid(steps=3), tmp_path).jobs
     assert not {job.path for job in other} & {job.path for job in jobs}
+
+
+def test_rollouts_start_within_the_squares_that_a_grid_names(tmp_path: Path) -> None:
+    plain, wide = grid(), grid(within=[0.03, 0.1])
+    assert "within" not in plain.to_dict()  # as results of before there was that key have it
+    assert Grid.from_dict(wide.to_dict()) == wide
+    jobs = {cell: of_cell for cell, of_cell in Plan(wide, tmp_path).targets.items() if cell.decoder == "joint"}
+    assert [cell.labels["within"] for cell in jobs] == [0.03, 0.1]
+    narrow, broad = (of_cell[0] for of_cell in jobs.values())
+    assert narrow.needs == broad.needs == Plan(plain, tmp_path).jobs[0].needs  # one policy
+    assert len({narrow.path, broad.path, Plan(plain, tmp_path).jobs[0].path}) == 3
+    assert broad.path.parent.name.endswith("-within-0.1") and broad.within == 0.1
+    config = ErIlEnvConfig(task="reach_cup", action_space="joint", within=0.1)
+    with closing(config.make()) as env:
+        places = np.array([env.reset(seed=seed)[0]["environment_state"][:2] for seed in range(1000, 1012)])
+    assert (np.ptp(places, axis=0) > 0.05).all() and (np.ptp(places, axis=0) < 0.1).all()
+    with pytest.raises(ErIlError, match="push_button_elbow places no cup"):
+        ErIlEnvConfig(task=TASK, within=0.1)
+
+
+def test_each_square_is_a_cell_of_its_own_in_results(tmp_path: Path) -> None:
+    outcomes = {(0.03, "joint"): "ooo", (0.03, "erj"): "oox", (0.1, "joint"): "oxx", (0.1, "erj"): "oox"}
+    rollouts = long_form(
+        (
+            {"task": "reach_cup", "decoder": decoder, "demonstrations": 32, "training_seed": 0, "within": width},
+            [
+                Rollout(i, o == "o", "" if o == "o" else "collision", Counter(ok=1), (1e-3,), 0.1)
+                for i, o in enumerate(of)
+            ],
+        )
+        for (width, decoder), of in outcomes.items()
+    )
+    cells = report_cells(rollouts)
+    assert [(each["within"], each["decoder"], each["successes"]) for each in cells] == [
+        (width, decoder, of.count("o")) for (width, decoder), of in outcomes.items()
+    ]
+    assert cells[3]["difference_to_joint"]["difference"] == pytest.approx(1 / 3)  # to joint in the same square
+    header, first, *_ = as_csv(rollouts).splitlines()
+    assert header.startswith("within,task,") and first.startswith("0.030000,reach_cup,joint,32,0,0,1,")
+    assert as_csv(cell("joint", "o")).startswith("task,decoder,")
+    values = report()
+    values["cells"], grid_of = cells, values["meta"]["grid"]
+    grid_of |= {"decoders": ["joint", "erj"], "posture_baselines": [], "within": [0.03, 0.1]}
+    (tmp_path / "results.json").write_text(json.dumps(values))
+    write_pages(tmp_path)
+    page = (tmp_path / "README.md").read_text()
+    assert "| `reach_cup` | 10 cm | **1/3**" in page and "in a square of the given width" in page
+    drawn = imread(tmp_path / "curves.png")
+    values["cells"][3]["successes"] = 0
+    (tmp_path / "results.json").write_text(json.dumps(values))
+    write_pages(tmp_path)
+    assert (imread(tmp_path / "curves.png") != drawn).any()
 
 
 def test_images_are_recorded_and_learnt_from_where_a_grid_says_so(tmp_path: Path) -> None:

@@ -193,7 +193,7 @@ def test_a_grid_fits_weights_to_the_demonstrations_that_a_policy_sees(reach_cup:
     demonstrated = Demonstrate(reach_cup, "demonstrate", (), 3, recipe, ("joint",), 1)
     leader = [episode.leader[:, :7].astype(np.float64) for episode in read_episodes(reach_cup / "joint")]
     for count in (1, 2):
-        job = FitWeights(tmp_path / f"erx-{count}", f"fit {count}", (demonstrated,), 1, count)
+        job = FitWeights(tmp_path / f"erx-{count}", f"fit {count}", (demonstrated,), 1, "erx", count)
         job.run()
         assert job.done and weights_of(job.dataset("erx")) == demonstrated_weights(PANDA, leader[:count])
         assert Dataset(job.path).count == 3 and job.recipe == recipe

@@ -4,6 +4,7 @@ import json
 import logging
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from itertools import count
 from pathlib import Path
 
 import draccus
@@ -13,7 +14,7 @@ import pytest
 import torch
 from documented import documented
 from lerobot.datasets import LeRobotDataset
-from lerobot.policies.act.modeling_act import ACTPolicy
+from lerobot.policies.act.modeling_act import ACT, ACTPolicy
 from lerobot.robots import RobotConfig, make_robot_from_config
 from lerobot.scripts import lerobot_record, lerobot_replay, lerobot_rollout, lerobot_teleoperate, lerobot_train
 from lerobot.teleoperators import TeleoperatorConfig, make_teleoperator_from_config
@@ -24,8 +25,10 @@ from er_il import cli
 from er_il.envs.contract import check_policy
 from er_il.envs.lerobot_plugin import ErIlEnvConfig
 from er_il.envs.tasks import task_id
+from er_il.policy import chunk_pipelines
 from er_il.robots.hardware import ScriptedLeader, ScriptedLeaderConfig, SimFollower, SimFollowerConfig
 from er_il.spaces.layout import Layout
+from er_il.spaces.relative import RelativeActions
 from er_il.spaces.spec import ACTION
 from er_il.support.errors import ErIlError, PolicyError, UnknownNameError
 
@@ -179,6 +182,53 @@ def test_the_same_policy_unattached_drives_the_robot_that_decodes(
     assert "Simulated episode 0: success" in capfd.readouterr().err
     np.testing.assert_allclose(sent[: len(demonstration)], demonstration, atol=0.1)
     np.testing.assert_allclose(sent[-1][:7], demonstration[0][:7], atol=1.0)  # back where it started
+
+
+@pytest.fixture(scope="module")
+def relative(recorded: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A chunk-relative ERJ policy, trained for a step on what was recorded."""
+    folder = tmp_path_factory.mktemp("relative")
+    encode = ["encode", str(recorded), "--to", "rel_erj", "--chunk", "4", "--arm", "panda", "--units", "deg"]
+    run(cli.main, *encode, "--out", str(folder / "erj"))
+    train = ["--policy.type=act", "--policy.device=cpu", "--policy.push_to_hub=false", "--num_workers=0"]
+    train += ["--policy.pretrained_backbone_weights=null", *(f"--policy.{option}" for option in TINY)]
+    train += ["--policy.chunk_size=4", "--policy.n_action_steps=4"]
+    train += ["--policy.normalization_mapping={VISUAL: MEAN_STD, STATE: IDENTITY, ACTION: IDENTITY}"]
+    train += ["--dataset.repo_id=me/reach_erj", f"--dataset.root={folder / 'erj'}", "--dataset.video_backend=pyav"]
+    register_third_party_plugins()
+    chunk_pipelines.install()  # other tests of this process undo it
+    run(lerobot_train.main, *train, f"--output_dir={folder / 'out'}", "--steps=1", "--batch_size=2")
+    return folder / "out"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("decoder", ["robot", "policy"])
+def test_a_chunk_relative_policy_drives_the_robot(
+    decoder: str, relative: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+):
+    """The network says what the demonstration says, four actions at a time, relative to the joints that it sees."""
+    demonstration, actions = encoded_demonstration(relative)
+    spec = json.loads((relative.with_name("erj") / "meta/info.json").read_text())["features"][ACTION]["info"]["er_il"]
+    convert = RelativeActions(Layout.from_spec(spec), tuple(NAMES))
+    said = count(step=4)
+
+    def predict(network: ACT, batch: dict[str, torch.Tensor]) -> tuple[torch.Tensor, tuple[None, None]]:
+        step = next(said)
+        if step >= len(demonstration):
+            raise KeyboardInterrupt
+        chunk = convert.relative(chunk_at(actions, step)[:, :4].numpy(), batch["observation.state"].numpy())
+        return torch.from_numpy(chunk).float(), (None, None)
+
+    monkeypatch.setattr(ACT, "forward", predict)
+    sent = sent_to_followers(monkeypatch)
+    path, robot = relative / "checkpoints/last/pretrained_model", DECODING
+    if decoder == "policy":
+        path, robot = relative.with_name("attached"), ROBOT
+        run(cli.main, "attach", str(relative), "--out", str(path), "--fps", "20")
+    run(lerobot_rollout.main, f"--policy.path={path}", *robot, "--fps=100", "--task=Reach the cup.",
+        "--return_to_initial_position=false")  # fmt: skip
+    assert "Simulated episode 0: success" in capfd.readouterr().err
+    np.testing.assert_allclose(sent[: len(demonstration) - 4], demonstration[:-4], atol=0.1)
 
 
 @pytest.mark.slow

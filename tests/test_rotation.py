@@ -57,5 +57,5 @@ def test_what_stands_for_no_rotation_is_refused():
 
 
 def test_unknown_code_names_the_valid_ones():
-    with pytest.raises(UnknownNameError, match=r"^Unknown rotation 'euler'\. Valid: quat, rot6d\.$"):
+    with pytest.raises(UnknownNameError, match=r"^Unknown rotation 'euler'\. Valid: quat, rot6d, rot6d_rows\.$"):
         make_rotation("euler", np.eye(3))

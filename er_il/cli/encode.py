@@ -17,6 +17,7 @@ def encode(
     angle_frames: Names = (),
     rotation: str = "quat",
     weights: Path | None = None,
+    chunk: int = 20,
     keep: bool = True,
     repo_id: str = "",
 ) -> None:
@@ -28,13 +29,14 @@ def encode(
     Args:
         source: Folder of the dataset, or its repository id on the hub.
         to: joint, task, erj, era, era@stereo or erx; joint goes back through the decoder to the robot's own joint
-            values.
+            values. With rel_ in front, policies see chunks of these actions relative to the state.
         out: Folder of the new dataset.
         robot: The arm of a dataset that does not know it.
         redundant: Joints of the URDF that erj commands; the first ones if omitted.
         angle_frames: Shoulder, elbow and wrist link, for era; those at which seven joints bend if omitted.
-        rotation: quat or rot6d.
+        rotation: quat, rot6d (the first two columns of the rotation matrix) or rot6d_rows (its first two rows).
         weights: File of the weights of erx, which er-il advise --fit erx writes; those of the arm if omitted.
+        chunk: Actions of a chunk, of a space with rel_ in front: that of the policy or more.
         keep: Keep the actions as they were, and other columns of actions, in columns source.*, which no policy reads.
         repo_id: Repository id that the dataset will have on the hub: its card then links to LeRobot's visualiser.
     """
@@ -58,6 +60,7 @@ def encode(
             weights=given,
             keep=keep,
             repo_id=repo_id,
+            chunk=chunk,
             on_progress=lambda done, total: progress.update(bar, completed=done, total=total, visible=True),
         )
     names = written.layout.encoded_names

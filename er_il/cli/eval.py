@@ -21,7 +21,8 @@ def eval(
     Args:
         policy: Folder of the policy: a training's output, or the pretrained model in it.
         task: Task, such as reach_cup.
-        decoder: joint, task-nearest, task-posture, task-clear, erj, era, erx, erj@JOINT, era@stereo.
+        decoder: joint, task-nearest, task-posture, task-clear, erj, era, erx, erj@JOINT, era@stereo; with rel_ in
+            front, as in rel_erj, of a chunk-relative policy.
         episodes: Number of rollouts.
         seed: Seed of the first; the same seeds give every decoder the same initial states.
         on_invalid: What the arm does with an action that cannot be decoded: best_effort, hold, stop.

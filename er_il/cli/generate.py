@@ -17,6 +17,7 @@ def generate(
     cameras: Annotated[str | None, arg(metavar="NAME,NAME")] = None,
     size: int | None = None,
     weights: Path | None = None,
+    chunk: int = 20,
     agent: Path | None = None,
     out: Path | None = None,
 ) -> None:
@@ -27,7 +28,8 @@ def generate(
     Args:
         task: Task, such as reach_cup.
         spaces: Action spaces, separated by commas: joint, task, erj, era, erx, or erj@JOINT to command another
-            joint, era@stereo for another reference of the arm angle.
+            joint, era@stereo for another reference of the arm angle. With rel_ in front, policies see chunks of these
+            actions relative to the state.
             They name the datasets' folders.
         episodes: Number of demonstrations.
         seed: Seed of the demonstrations.
@@ -35,6 +37,7 @@ def generate(
         cameras: Cameras to record, separated by commas, such as wrist,shoulder.
         size: Width and height of the cameras' images [px].
         weights: File of the weights of erx, which er-il advise --fit erx writes; those of the arm if omitted.
+        chunk: Actions of a chunk, of a space with rel_ in front: that of the policy or more.
         agent: Folder of a trained agent (er-il rl train), which demonstrates instead of the leader, 10 times a second.
         out: Folder of the datasets; datasets/<task> if omitted, and datasets/<task>_<arm> for another arm than the
             recipe's.
@@ -69,7 +72,7 @@ def generate(
     folder = out if out is not None else Path("datasets") / name
     console = Console()
     with make_progress(console) as progress:
-        generated = generate_datasets(recipe, asked, folder, progress, cores(), rows, demonstrator)
+        generated = generate_datasets(recipe, asked, folder, progress, cores(), rows, chunk, demonstrator)
     for space, path in generated.paths.items():
         console.print(
             f"{path}: {'written' if space in generated.new else 'was there already'}", highlight=False, soft_wrap=True

@@ -21,7 +21,7 @@ def train(
 
     Args:
         task: Task, such as reach_cup.
-        space: Action space of the dataset: joint, task, erj, era, erj@JOINT, era@stereo.
+        space: Action space of the dataset: joint, task, erj, era, erj@JOINT, era@stereo, or rel_erj and the like.
         steps: Training steps; the configuration's if omitted.
         seed: Seed of the training.
         dataset: Folder of the dataset; datasets/<task>/<space> if omitted.

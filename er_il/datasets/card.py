@@ -147,10 +147,10 @@ def _numbers(values: Sequence[float]) -> str:
 def dimension_meaning(layout: Layout, name: str) -> str:
     """Describe a dimension of the encoded vector, with its unit."""
     for part in layout.parts:
-        if layout.kind == JOINT and name in part.motors.joints:
+        if layout.commands == JOINT and name in part.motors.joints:
             joint = part.space.arm.joints[part.motors.joints.index(name)]
             return f"joint `{joint}` [{part.motors.units}]"
-        if layout.kind != JOINT and name in part.names:
+        if layout.commands != JOINT and name in part.names:
             return _meaning(part, name.removeprefix(f"{part.label}_"))
     return "as in the source"
 

@@ -16,6 +16,7 @@ from er_il.datasets.history import recorded_spec
 from er_il.datasets.metadata import DatasetInfo
 from er_il.datasets.schema import LEADER_JOINTS, SOURCE_ACTION, SOURCE_JOINTS, STATE, Feature, dimension_names
 from er_il.datasets.tables import column_of, episode_slices, parquet_files, read_table, reading
+from er_il.spaces.chunk import commands_of
 from er_il.spaces.joint import JOINT
 from er_il.spaces.layout import Layout
 from er_il.spaces.spec import ACTION, SPEC
@@ -183,7 +184,7 @@ class Dataset:
     def joints_column(self, layout: Layout) -> str | None:
         """Name of the column that holds the joint vectors of a layout as they were recorded, if there is one."""
         for column in (LEADER_JOINTS, SOURCE_JOINTS, SOURCE_ACTION, ACTION):
-            encoded = column == ACTION and self.specified and self.spec["space"] != JOINT
+            encoded = column == ACTION and self.specified and commands_of(self.spec["space"]) != JOINT
             if self.names(column) == layout.names and not encoded:
                 return column
         return None

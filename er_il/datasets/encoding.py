@@ -7,7 +7,7 @@ import numpy as np
 
 from er_il.datasets.dataset import Dataset, Floats
 from er_il.datasets.decoding import DecodedEpisode, decode_episodes, read_encoded_episodes
-from er_il.datasets.normalisation import bound_rotation_deviation
+from er_il.datasets.normalisation import normalise_actions
 from er_il.datasets.rewriting import Advance, Column, rewrite
 from er_il.datasets.schema import LEADER_JOINTS, SOURCE_ACTION, action_feature
 from er_il.datasets.source_columns import (
@@ -38,7 +38,7 @@ def encode_dataset(
 
     The joint vectors are those that were recorded, wherever the source holds them. Only the action
     column, its feature and its statistics differ, and they are what LeRobot would have written had
-    the dataset been recorded in that space, but for :func:`er_il.datasets.normalisation.bound_rotation_deviation`. The
+    the dataset been recorded in that space, but for :func:`er_il.datasets.normalisation.normalise_actions`. The
     source stays as it is; the target appears only when complete.
 
     Args:
@@ -66,7 +66,7 @@ def encode_dataset(
     columns = {**kept.columns, ACTION: _encoded(source, layout, vectors)}
     with atomic_folder(target) as partial:
         rewrite(source, partial, columns, kept.copies, kept.dropped, advance)
-        bound_rotation_deviation(partial)
+        normalise_actions(partial)
         finish(partial)
 
 
@@ -103,7 +103,7 @@ def decode_dataset(
             feature, restored = found
             actions = Column(feature, actions.values)
         rewrite(source, partial, {ACTION: actions}, restored.copies, restored.dropped)
-        bound_rotation_deviation(partial)
+        normalise_actions(partial)
         finish(partial)
     return decoded
 

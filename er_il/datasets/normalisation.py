@@ -4,11 +4,14 @@ from pathlib import Path
 
 import numpy as np
 from lerobot.datasets import write_stats
+from lerobot.datasets.compute_stats import compute_episode_stats
 from lerobot.datasets.io_utils import load_stats
 
 from er_il.datasets.dataset import Dataset
+from er_il.datasets.rewriting import replace_statistics
 from er_il.datasets.schema import ENVIRONMENT_STATE, STATE
-from er_il.kinematics.rotation import Quaternion, Rot6d
+from er_il.kinematics.rotation import Quaternion, Rot6d, Rot6dRows
+from er_il.spaces.relative import RelativeActions, relative_samples
 from er_il.spaces.spec import ACTION
 
 Stats = dict[str, dict[str, np.ndarray]]
@@ -41,6 +44,33 @@ def normalise_observations(root: Path) -> None:
     _write(stats, root)
 
 
+def normalise_actions(root: Path) -> None:
+    """Set the statistics by which policies normalise actions: of chunk-relative ones, those of what policies see.
+
+    These are over all actions of all chunks (:func:`er_il.spaces.relative.relative_samples`), of each episode and of
+    all, so that LeRobot's edits of the dataset keep them. Rotations are then bounded, see below.
+
+    Args:
+        root: Folder of the dataset.
+
+    Raises:
+        ErIlError: the state does not measure the joints that chunk-relative actions count from.
+    """
+    dataset = Dataset(root)
+    if dataset.layout.chunk:
+        convert = RelativeActions(dataset.layout, dataset.names(STATE))
+        actions, states = dataset.vectors(ACTION), dataset.vectors(STATE)
+        samples = {
+            number: relative_samples(convert, actions[rows], states[rows]).astype(np.float32)
+            for number, rows in dataset.episodes.items()
+        }
+        features = dataset.features
+        replace_statistics(
+            root, {key: compute_episode_stats({ACTION: each}, features) for key, each in samples.items()}
+        )
+    bound_rotation_deviation(root)
+
+
 def bound_rotation_deviation(root: Path) -> None:
     """Set a lower bound on the standard deviation by which ``configs/`` normalise the rotations of actions.
 
@@ -53,7 +83,9 @@ def bound_rotation_deviation(root: Path) -> None:
     """
     stats = load_stats(root) or {}
     names = Dataset(root).names(ACTION)
-    rotations = np.array([name.endswith((*Quaternion.names, *Rot6d.names)) for name in names])  # of any arm
+    rotations = np.array(
+        [name.endswith((*Quaternion.names, *Rot6d.names, *Rot6dRows.names)) for name in names]
+    )  # of any arm
     stats[ACTION] |= {"std": np.maximum(stats[ACTION]["std"], LEAST_ROTATION * rotations)}
     _write(stats, root)
 

@@ -19,6 +19,7 @@ from er_il.datasets.demos import LEADER, Demo, Demonstrator, collect, demo_path,
 from er_il.datasets.recipe import Recipe
 from er_il.datasets.record import DatasetRecord
 from er_il.kinematics.linear_coordinates import SPEC_KEY
+from er_il.spaces.chunk import CHUNK, chunk_of
 from er_il.spaces.layout import Layout
 from er_il.spaces.registry import check_space, make_arm_space
 from er_il.support.atomic_files import PARTIAL, work_folder, write_json
@@ -43,6 +44,7 @@ def generate(
     progress: Progress,
     workers: int,
     weights: Mapping[str, Weights] = MappingProxyType({}),
+    chunk: int = CHUNK,
     demonstrator: Demonstrator = LEADER,
 ) -> Generated:
     """Record a recipe's demos and write one dataset a space into ``out``.
@@ -57,6 +59,7 @@ def generate(
         progress: Where to show progress.
         workers: Number of worker processes.
         weights: Of ERX (n-6, n), by the arm's label; those of the arms where it says nothing.
+        chunk: Number of actions of a chunk, in the chunk-relative spaces.
         demonstrator: Who demonstrates.
 
     Raises:
@@ -71,13 +74,14 @@ def generate(
     arms = {**arms, **{label: arms[label].weighing(rows) for label, rows in weights.items()}}
     for space in asked or ("",):
         check_space(space)
-        layouts[space] = Layout.of_spaces({label: make_arm_space(space, arm) for label, arm in arms.items()})
+        own = {label: make_arm_space(space, arm) for label, arm in arms.items()}
+        layouts[space] = Layout.of_spaces(own, chunk_of(space, chunk))
     with _writing_to(out), work_folder(out) as work:
         there = {path.name for path in datasets_in(out)} | {space for space in asked if (out / space).exists()}
         for space in sorted(there):
             _check_same(recipe, DatasetRecord.read(out / space).recipe, out / space)
             if space in layouts:
-                _check_weights(layouts[space], out / space)
+                _check_encoding(layouts[space], out / space)
         new = tuple(space for space in asked if space not in there)
         first = out / min(there, default=asked[0])
         if not there:
@@ -152,8 +156,11 @@ def _check_same(asked: Recipe, found: Recipe, where: Path) -> None:
         )
 
 
-def _check_weights(asked: Layout, dataset: Path) -> None:
-    if _weights(asked.spec()) != _weights(Dataset(dataset).spec):
+def _check_encoding(asked: Layout, dataset: Path) -> None:
+    found = Dataset(dataset).spec
+    if asked.spec().get("chunk") != found.get("chunk"):
+        raise DatasetError(f"{dataset} has chunks of {found.get('chunk')} actions; choose another --out.")
+    if _weights(asked.spec()) != _weights(found):
         raise DatasetError(f"{dataset} has other weights of its linear coordinates; choose another --out.")
 
 

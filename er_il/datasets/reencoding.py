@@ -17,8 +17,10 @@ from er_il.datasets.number_checks import check_numbers
 from er_il.datasets.schema import SOURCE, STATE
 from er_il.datasets.weights import WeightsFile
 from er_il.datasets.wiring import Wiring
+from er_il.spaces.chunk import CHUNK, commands_of
 from er_il.spaces.joint import JOINT
 from er_il.spaces.layout import Layout
+from er_il.spaces.relative import RelativeActions
 from er_il.spaces.spec import ACTION
 from er_il.support.atomic_files import check_absent, check_outside, check_writable
 
@@ -42,6 +44,7 @@ def reencode(
     weights: WeightsFile | None = None,
     keep: bool,
     repo_id: str = "",
+    chunk: int = CHUNK,
     on_progress: Callable[[int, int], object],
 ) -> Reencoded:
     """Write a dataset again with its actions in another action space.
@@ -53,11 +56,12 @@ def reencode(
         source: Folder, or repository id.
         target: Folder that does not exist.
         kind: See :func:`er_il.spaces.make_action_space`.
-        rotation: ``quat`` or ``rot6d``.
+        rotation: ``quat``, ``rot6d`` or ``rot6d_rows``.
         wirings: The arms of a dataset that does not know them.
         weights: Of ERX; those of the arms if omitted.
         keep: Keep the joint vectors and what else the source has as actions, where no policy reads them.
         repo_id: Where the target will be on the hub, for its card.
+        chunk: Number of actions of a chunk, in a chunk-relative space.
         on_progress: Called with the number of frames done, and their total.
 
     Raises:
@@ -67,9 +71,11 @@ def reencode(
     dataset = Dataset(find_dataset(source))
     check_whole(dataset)
     dataset, known = read_layout(dataset, wirings)
-    layout = known.in_space(kind, rotation, weights.of(known.arms) if weights else {})
-    encoded = dataset.specified and dataset.spec["space"] != JOINT
-    decode = encoded and (kind == JOINT or dataset.joints_column(layout) is None)
+    layout = known.in_space(kind, rotation, weights.of(known.arms) if weights else {}, chunk)
+    if layout.chunk:
+        RelativeActions(layout, dataset.names(STATE))  # raises unless the state measures what they count from
+    encoded = dataset.specified and commands_of(dataset.spec["space"]) != JOINT
+    decode = encoded and (commands_of(kind) == JOINT or dataset.joints_column(layout) is None)
     check_absent(target)
     check_outside(target, dataset.root)
     check_writable(target)
@@ -90,6 +96,7 @@ def reencode(
 
     def finish(partial: Path) -> None:
         options: dict[str, Any] = {"to": kind, "rotation": rotation, "decoded": decode}
+        options |= {"chunk": layout.chunk} if layout.chunk else {}
         options |= {"weights": weights.to_dict()["arms"]} if weights else {}
         options |= _columns(dataset) | ({SPECIFICATION: layout.spec()} if restored else {})
         # A folder is named without its place on this machine.

@@ -91,15 +91,28 @@ def rewrite(
         episodes = _without_stats(_with_copied_stats(read_table(path), copies), dropped)
         episodes = _with_stats(episodes, stats)
         pq.write_table(episodes, _new(target, source.root, path))
-    # LeRobot adds one episode after the other; the same order gives the same digits.
-    total: Stats = functools.reduce(
-        lambda sofar, each: aggregate_stats([sofar, each]), (stats[episode] for episode in sorted(stats))
-    )
     before = load_stats(source.root) or {}
     copied = {name: before[copy.of] for name, copy in copies.items() if copy.of in before}
     kept = {name: own for name, own in before.items() if name not in dropped}
-    write_stats(kept | copied | total, target)
+    write_stats(kept | copied | _total(stats), target)
     write_info(info, target)
+
+
+def replace_statistics(root: Path, stats: Mapping[int, Stats]) -> None:
+    """Give columns of a dataset other statistics, of each episode and of all.
+
+    Args:
+        root: Folder of the dataset.
+        stats: Statistics of the columns, by episode.
+    """
+    for path in parquet_files(root / EPISODES):
+        pq.write_table(_with_stats(read_table(path), stats), path)
+    write_stats((load_stats(root) or {}) | _total(stats), root)
+
+
+def _total(stats: Mapping[int, Stats]) -> Stats:
+    """Statistics of all episodes. LeRobot adds one after the other; the same order gives the same digits."""
+    return functools.reduce(lambda sofar, each: aggregate_stats([sofar, each]), (stats[key] for key in sorted(stats)))
 
 
 def _with_columns(table: pa.Table, values: Mapping[str, Floats], schema: pa.Schema) -> pa.Table:

@@ -13,7 +13,7 @@ from lerobot.datasets.io_utils import write_info
 from lerobot.utils.utils import SuppressProgressBars
 
 from er_il.datasets.demos import Demo
-from er_il.datasets.normalisation import bound_rotation_deviation, normalise_observations
+from er_il.datasets.normalisation import normalise_actions, normalise_observations
 from er_il.datasets.recipe import Recipe
 from er_il.datasets.record import DatasetRecord
 from er_il.datasets.schema import DEMO_SEED, ENVIRONMENT_STATE, IMAGES, LEADER_JOINTS, STATE, features
@@ -74,5 +74,5 @@ class Writer:
         info.splits = self._recipe.splits
         write_info(info, self._dataset.root)
         normalise_observations(self._dataset.root)
-        bound_rotation_deviation(self._dataset.root)
+        normalise_actions(self._dataset.root)
         DatasetRecord(self._recipe, dropped).write(self._dataset.root)

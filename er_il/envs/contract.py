@@ -26,6 +26,7 @@ from er_il.envs.trust import POSTPROCESSOR, check_steps, read_processor
 from er_il.kinematics.linear_coordinates import SPEC_KEY
 from er_il.kinematics.rotation import Quaternion
 from er_il.spaces.base import ArmSpace
+from er_il.spaces.chunk import commands_of
 from er_il.spaces.layout import Layout
 from er_il.spaces.registry import AND, AT, ERX, weights_text
 from er_il.spaces.spec import action_spec
@@ -38,6 +39,8 @@ NONE = "-"
 
 # Name of the post-processing step that `er-il attach` gives a policy, to decode for a robot by itself.
 DECODE_POLICY_ACTION = "er_il_decode_policy_action"
+# The pair of steps of a policy that acts chunk-relative (:mod:`er_il.policy.chunk_steps`).
+RELATIVE_ACTIONS, ABSOLUTE_ACTIONS = "er_il_relative_actions", "er_il_absolute_actions"
 
 
 @dataclass(frozen=True)
@@ -54,7 +57,7 @@ class Contract:
     def of_spec(cls, spec: Mapping[str, Any]) -> "Contract":
         """Return the contract of the specification of an action space, or of a layout."""
         if "arms" in spec:
-            return cls._of_arms(spec["arms"])
+            return replace(cls._of_arms(spec["arms"]), space=spec["space"])
         arm, rotation = spec["arm"], spec.get("rotation", NONE)
         if SPEC_KEY in spec:
             return cls(spec["space"], arm["name"], arm["ee_frame"], rotation, weights_text(spec[SPEC_KEY]["weights"]))
@@ -127,8 +130,8 @@ def decoder_for(name: str, contract: Contract) -> Decoder:
     """
     chosen = decoder(name)
     alone = contract.arm in PRESETS  # several arms have the weights of their presets
-    weighed = alone and chosen.space == contract.space == ERX
-    return replace(chosen, space=ERX + AT + contract.redundant) if weighed else chosen
+    weighed = alone and chosen.space == contract.space and commands_of(chosen.space) == ERX
+    return replace(chosen, space=chosen.space + AT + contract.redundant) if weighed else chosen
 
 
 def check_policy(policy: str | Path, space: ArmSpace | Layout, trust: bool = False) -> None:
@@ -193,10 +196,26 @@ def decodes(policy: str | Path) -> bool:
     Raises:
         PolicyError: its post-processor is damaged, or the Hub has no such policy.
     """
+    return _has_step(policy, DECODE_POLICY_ACTION)
+
+
+def chunk_relative(policy: str | Path) -> bool:
+    """True if a policy's processors make chunk-relative actions absolute.
+
+    Args:
+        policy: Folder of a pretrained policy, or its Hub id.
+
+    Raises:
+        PolicyError: as :func:`decodes`.
+    """
+    return _has_step(policy, ABSOLUTE_ACTIONS)
+
+
+def _has_step(policy: str | Path, name: str) -> bool:
     path = policy_file(policy, POSTPROCESSOR)
     if path is None:
         return False  # LeRobot says what is missing
-    return any(step.get("registry_name") == DECODE_POLICY_ACTION for step in read_processor(path)["steps"])
+    return any(step.get("registry_name") == name for step in read_processor(path)["steps"])
 
 
 def _of_dataset(policy: str | Path) -> Contract | None:

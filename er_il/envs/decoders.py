@@ -14,6 +14,7 @@ import numpy as np
 from er_il.arms.arm import Arm
 from er_il.envs.protocol import ClearanceEnv, arms_of, clearance_env, robot_env
 from er_il.spaces.base import ArmSpace
+from er_il.spaces.chunk import RELATIVE, chunk_of, commands_of
 from er_il.spaces.clear import keeping_clear
 from er_il.spaces.delta import PREFIX
 from er_il.spaces.layout import Layout
@@ -29,6 +30,8 @@ RESOLUTIONS = (NEAREST, POSTURE, CLEAR)
 class Decoder:
     """An action space by name, absolute or delta, and how IK resolves what the action leaves open.
 
+    A chunk-relative space decodes as that of its commands: the policy's processors have made them absolute.
+
     ``nearest`` takes the solution near the measured joints, ``posture`` the one near a posture: the
     arm's comfortable one, or the one given here. ``clear`` slides along the self-motion away from the
     world, whose true distances it needs: in simulation only. Only task space leaves anything open.
@@ -42,7 +45,7 @@ class Decoder:
         split_name(self.space)  # raises if unknown
         if self.resolution not in RESOLUTIONS:
             raise UnknownNameError("resolution", self.resolution, RESOLUTIONS)
-        if self.resolution == CLEAR and self.space.removeprefix(PREFIX) != TASK:
+        if self.resolution == CLEAR and commands_of(self.space).removeprefix(PREFIX) != TASK:
             raise ErIlError(f"The resolution {CLEAR} is for task space: {self.space} leaves it nothing to resolve.")
 
     def works_in(self, env: gymnasium.Env[Any, Any]) -> bool:
@@ -58,7 +61,8 @@ class Decoder:
         if self.resolution != CLEAR:
             return self.layout_of(arms_of(robot_env(env)), rotation)
         world = clearance_env(env)
-        return Layout.of_space(keeping_clear(self.space_of(world.arm, rotation), world.clearances))
+        space = keeping_clear(self.space_of(world.arm, rotation), world.clearances)
+        return Layout.of_spaces({"": space}, chunk_of(self.space))
 
     def space_of(self, arm: Arm, rotation: str = "quat") -> ArmSpace:
         """Build the action space for an arm, as far as no world is needed: what actions mean, whatever decodes them."""
@@ -76,13 +80,16 @@ class Decoder:
             {
                 label: make_arm_space(self.space, arm, rotation=rotation, posture=posture)
                 for (label, arm), posture in zip(arms.items(), postures, strict=True)
-            }
+            },
+            chunk_of(self.space),
         )
 
 
 def _decoders() -> dict[str, Decoder]:
-    table = {space: Decoder(space) for space in SPACES if space != TASK}
-    table |= {f"task-{resolution}": Decoder(TASK, resolution) for resolution in RESOLUTIONS}
+    table = {}
+    for prefix in ("", RELATIVE):
+        table |= {prefix + space: Decoder(prefix + space) for space in SPACES if space != TASK}
+        table |= {f"{prefix}{TASK}-{resolution}": Decoder(prefix + TASK, resolution) for resolution in RESOLUTIONS}
     return table
 
 

@@ -18,9 +18,10 @@ from er_il.control.commander import BEST_EFFORT, check_answer
 from er_il.envs.contract import check_policy
 from er_il.envs.decoders import CLEAR, NEAREST, Decoder
 from er_il.envs.side_by_side import BATCH_FROM, BatchDecodingEnv, ProcessesEnv, SideBySideEnv
-from er_il.envs.tasks import task_id
+from er_il.envs.tasks import WITHIN, takes_option, task_id
 from er_il.envs.wrapper import ActionSpaceEnv, make_action_space_env
 from er_il.spaces.layout import Layout
+from er_il.support.errors import ErIlError
 
 _USUAL = 20  # [Hz]
 
@@ -33,14 +34,16 @@ class ErIlEnvConfig(EnvConfig):
     Attributes:
         fps: Control rate [Hz], of the tasks here 20 or 10, as in the dataset that the policy was trained on.
         action_space: ``joint``, ``task``, ``erj``, ``era``, or ``erj@<joint>`` if ERJ commands another joint,
-            ``era@stereo`` with another reference of the arm angle; with ``delta_`` in front, changes of its commands.
+            ``era@stereo`` with another reference of the arm angle; with ``delta_`` in front, changes of its commands,
+            with ``rel_``, its commands by a policy that sees them relative to the state.
         resolution: What IK does with the freedom that task space leaves: ``nearest``, ``posture`` or ``clear``.
         posture: Joint angles [rad] to which ``posture`` pulls; the arm's comfortable ones if empty.
-        rotation: ``quat`` or ``rot6d``, as in the dataset that the policy was trained on.
+        rotation: ``quat``, ``rot6d`` or ``rot6d_rows``, as in the dataset that the policy was trained on.
         arm: Name of the arm, or of a robot of several, such as ``openarm_v2``.
         on_invalid: What the arm does with an invalid action: ``best_effort``, ``hold``, ``stop``.
         cameras: Cameras that the policy sees, none for a state-based policy.
         image_size: Width and height of their images [px].
+        within: Side [m] of the square in which the cup starts, of tasks that place one; the task's own range if 0.
         visualization_width: Width of the stock commands' films [px], which LeRobot holds in memory twice until all
             are written.
         visualization_height: Height of these [px].
@@ -57,12 +60,15 @@ class ErIlEnvConfig(EnvConfig):
     on_invalid: str = BEST_EFFORT
     cameras: list[str] = field(default_factory=list)
     image_size: int = 96
+    within: float = 0.0
     visualization_width: int = 320
     visualization_height: int = 240
     trust: bool = False
 
     def __post_init__(self) -> None:
         check_answer(self.on_invalid)
+        if self.within and not takes_option(self.gym_id, WITHIN):
+            raise ErIlError(f"{self.task} places no cup; leave out --env.within.")
         # An environment may know no rate but its own: it is asked for one only if it is not the usual one.
         self._rate = None if self.fps == _USUAL else self.fps
         probe = _probe(self.gym_id, self.arm, tuple(self.cameras), self.image_size, self._rate)
@@ -85,6 +91,7 @@ class ErIlEnvConfig(EnvConfig):
             "render_mode": "rgb_array",  # the stock commands film some episodes
             "visualization_width": self.visualization_width,
             "visualization_height": self.visualization_height,
+            **({WITHIN: (self.within, self.within)} if self.within else {}),
         }
 
     def make(self) -> ActionSpaceEnv:

@@ -4,15 +4,19 @@ Tasks come from packages that name a module under the entry points ``er_il.tasks
 registers them with Gymnasium, in a namespace of the entry point's name.
 """
 
+import inspect
 import re
 from functools import cache
 from importlib.metadata import entry_points
+from typing import Any
 
 import gymnasium
+from gymnasium.envs.registration import load_env_creator
 
 from er_il.support.errors import UnknownNameError
 
 GROUP = "er_il.tasks"
+WITHIN = "cup_range"  # option of the tasks that place a cup: the sides [m] of the rectangle in which it starts
 
 
 def task_names() -> tuple[str, ...]:
@@ -32,6 +36,17 @@ def task_id(name: str) -> str:
     if name not in ids:
         raise UnknownNameError("task", name, sorted(ids))
     return ids[name]
+
+
+def takes_option(name: str, option: str) -> bool:
+    """True if the environment of a task takes a keyword argument of its own."""
+    creator: Any = gymnasium.registry[task_id(name)].entry_point
+    if isinstance(creator, str):
+        creator = load_env_creator(creator)
+    # Classes pass on what their bases take.
+    return any(
+        option in inspect.signature(each).parameters for each in getattr(creator, "__mro__", (creator, object))[:-1]
+    )
 
 
 @cache

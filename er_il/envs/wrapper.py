@@ -165,7 +165,7 @@ def make_action_space_env(
     Args:
         task: Name of the task, or Gymnasium id of a joint-level environment.
         decoder: The action space and its resolution.
-        rotation: ``quat`` or ``rot6d``.
+        rotation: ``quat``, ``rot6d`` or ``rot6d_rows``.
         on_invalid: See :class:`er_il.control.commander.Commander`.
         kwargs: Passed on to ``gymnasium.make``.
 

@@ -24,7 +24,7 @@ Picture = NDArray[np.uint8]  # (H, W, 3)
 
 
 def record_rollout(
-    policy: Path, task: str, decoder_name: str, seed: int, film_every: int = 0
+    policy: Path, task: str, decoder_name: str, seed: int, film_every: int = 0, within: float | None = None
 ) -> tuple[Trace, list[Picture]]:
     """Roll a policy out once, exactly as :func:`er_il.evaluation.rollouts.evaluate` does on that seed.
 
@@ -34,8 +34,9 @@ def record_rollout(
         decoder_name: ``joint``, ``task-nearest``, ``task-posture``, ``task-clear``, ``erj``, ``era``.
         seed: Seed of the initial state.
         film_every: Take a picture each so many control steps, and one at the end; 0: none.
+        within: See :func:`er_il.evaluation.rollouts.evaluate`.
     """
-    config = environment_of(policy, task, decoder_name)
+    config = environment_of(policy, task, decoder_name, within=within)
     config.visualization_width, config.visualization_height = PICTURE
     rows: dict[str, list[Any]] = {key: [] for key in ("q", "gripper", "action", "command", "status", "state")}
     pictures: list[Picture] = []

@@ -21,6 +21,8 @@ RESULTS = "results.json"  # the report of a grid, from which everything is rende
 EPISODES = "episodes.csv.gz"
 
 CELL = ["task", "decoder", "demonstrations"]
+KINDS = {"demonstrations": int, "within": float}  # of the values that tell cells apart, beside names
+WITHIN = "within"  # one more of a cell, in grids that vary where initial states are drawn
 LABELS = [*CELL, "training_seed"]
 COUNTS = ["seed", "success", "failure", "steps", "invalid", "max_joint_step"]
 COLUMNS = [*LABELS, *COUNTS, "elbow_error"]  # of a CSV; in memory there are statuses and latencies, too
@@ -58,23 +60,25 @@ def load_notes(path: Path) -> dict[str, Any]:
 
 
 def long_form(groups: Iterable[tuple[Mapping[str, object], Iterable[Rollout]]]) -> pd.DataFrame:
-    """Return one row a rollout: :data:`COLUMNS`, ``statuses`` and ``latencies``.
+    """Return one row a rollout: :data:`COLUMNS`, :data:`WITHIN` if it is among the labels, ``statuses``, ``latencies``.
 
     Args:
-        groups: Values of :data:`LABELS`, and the rollouts that they hold for.
+        groups: Values of :data:`LABELS`, and of :data:`WITHIN` if it varies, and the rollouts that they hold for.
     """
     rows = [
         {**labels, **vars(each), "steps": each.steps, "invalid": each.invalid, "max_joint_step": each.joint_step}
         for labels, rollouts in groups
         for each in rollouts
     ]
-    columns = pd.Index([*COLUMNS, "statuses", "latencies"])
+    varied = [WITHIN] if any(WITHIN in row for row in rows) else []
+    columns = pd.Index([*varied, *COLUMNS, "statuses", "latencies"])
     return pd.DataFrame(rows, columns=columns).astype({"elbow_error": float})
 
 
-def as_csv(rollouts: pd.DataFrame, columns: Sequence[str] = COLUMNS) -> str:
-    """Return the rollouts as CSV, a row each."""
+def as_csv(rollouts: pd.DataFrame, columns: Sequence[str] = ()) -> str:
+    """Return the rollouts as CSV, a row each, with these columns or all that :func:`long_form` says of a rollout."""
     shown = rollouts.astype({"success": int})
+    columns = columns or [name for name in (WITHIN, *COLUMNS) if name in rollouts]
     return shown.to_csv(columns=list(columns), index=False, float_format="%.6f", lineterminator="\n")
 
 
@@ -105,7 +109,7 @@ def summarise(rollouts: pd.DataFrame) -> dict[str, Any]:
     return report
 
 
-def report_cells(rollouts: pd.DataFrame, cell_of: Sequence[str] = CELL) -> list[dict[str, Any]]:
+def report_cells(rollouts: pd.DataFrame, cell_of: Sequence[str] = ()) -> list[dict[str, Any]]:
     """Return each cell as JSON: the rollouts of all training seeds together, then seed by seed.
 
     Where :data:`REFERENCE` met the same initial states with policies of the same training seeds, the paired
@@ -113,14 +117,16 @@ def report_cells(rollouts: pd.DataFrame, cell_of: Sequence[str] = CELL) -> list[
 
     Args:
         rollouts: In long form.
-        cell_of: The columns of a cell: ``task``, ``decoder``, and what else tells cells apart.
+        cell_of: The columns of a cell: ``task``, ``decoder``, and what else tells cells apart; those of
+            :data:`CELL`, and :data:`WITHIN` where it is, if empty.
     """
+    cell_of = cell_of or [name for name in (*CELL, WITHIN) if name in rollouts]
     matched = [*(column for column in cell_of if column != "decoder"), "training_seed", "seed"]
     reference = rollouts.loc[rollouts["decoder"] == REFERENCE, [*matched, "success"]]
     cells = []
     for key, cell in rollouts.groupby(list(cell_of), sort=False):
         labels = dict(zip(cell_of, _labels(key), strict=True))
-        others = {name: int(value) for name, value in labels.items() if name not in ("task", "decoder")}
+        others = {name: KINDS[name](value) for name, value in labels.items() if name in KINDS}
         report = {"task": labels["task"], "decoder": labels["decoder"]} | summarise(cell) | others
         per_seed = {seed: summarise(part) for seed, part in cell.groupby("training_seed", sort=False)}
         report["per_seed"] = [

@@ -28,6 +28,7 @@ def evaluate(
     on_invalid: str = BEST_EFFORT,
     posture: Sequence[float] = (),
     elbow: ElbowReference | None = None,
+    within: float | None = None,
     batch_size: int = POLICY_ROWS,
     trust: bool = False,
     advance: Callable[[int], None] = lambda episodes: None,
@@ -44,6 +45,7 @@ def evaluate(
         on_invalid: See :class:`er_il.control.commander.Commander`.
         posture: (n,) [rad] to which ``task-posture`` pulls; the arm's comfortable one if empty.
         elbow: What to measure the elbow against, if anything.
+        within: Side [m] of the square in which the cup starts; the task's own range if None.
         batch_size: Environments side by side, up to ``POLICY_ROWS``; it changes no result, unless the policy
             draws random numbers, as Diffusion does.
         trust: See :func:`er_il.envs.contract.check_policy`.
@@ -57,7 +59,7 @@ def evaluate(
     check_evaluation(policy, task, decoder_name, episodes, on_invalid, trust)
     if not 1 <= batch_size <= POLICY_ROWS:
         raise ErIlError(f"The batch size is {batch_size}; it must be between 1 and {POLICY_ROWS}.")
-    config = environment_of(policy, task, decoder_name, on_invalid, posture)
+    config = environment_of(policy, task, decoder_name, on_invalid, posture, within)
     vector = config.create_envs(min(batch_size, episodes))[config.type][0]
     assert isinstance(vector, SyncVectorEnv)
     with closing(vector), one_thread():

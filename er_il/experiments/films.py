@@ -23,16 +23,19 @@ COLLISION = "collision"  # how the failures begin that a film shows best
 def films(plan: Plan, decoders: Sequence[str]) -> dict[str, list[Film]]:
     """The films of each task whose cells with these decoders are complete."""
     grid, complete, found = plan.grid, plan.complete, {}
-    count, training_seed = max(grid.demonstrations), grid.training_seeds[0]
+    count, training_seed, width = max(grid.demonstrations), grid.training_seeds[0], (*grid.within, None)[0]
     names = [name for name in decoders if name in grid.decoders]
     for task in grid.tasks if names else ():
-        cells = [Cell(task, name, count) for name in names]
+        cells = [Cell(task, name, count, width) for name in names]
         if all(cell in complete for cell in cells):
             seed = telling_seed(plan.rollouts(*cells).query("training_seed == @training_seed"))
             trainings = [plan.training(cell, training_seed) for cell in cells]
-            folder = plan.out / "films" / task / f"{trainings[0].path.stem}-start-{seed}"
+            start = f"start-{seed}" if width is None else f"start-{seed}-within-{width:g}"
+            folder = plan.out / "films" / task / f"{trainings[0].path.stem}-{start}"
             found[task] = [
-                Film(folder / f"{name}.npz", f"film {task} through {name} from {seed}", (trained,), 1, name, seed)
+                Film(
+                    folder / f"{name}.npz", f"film {task} through {name} from {seed}", (trained,), 1, name, seed, width
+                )
                 for name, trained in zip(names, trainings, strict=True)
             ]
     return found

@@ -2,12 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Self
+from typing import Annotated, Any, Self
 
-from pydantic import AliasChoices, Field, StrictInt, StrictStr, model_validator
+from pydantic import AliasChoices, Field, StrictFloat, StrictInt, StrictStr, model_validator
 
 from er_il.arms.robot import robot_arms
 from er_il.datasets.recipe import Recipe
+from er_il.envs.tasks import WITHIN, takes_option, task_names
 from er_il.evaluation.posture_baselines import POSTURE_BASELINES, space_of
 from er_il.support.declaration import Declaration
 from er_il.support.errors import ErIlError, UnknownNameError
@@ -17,6 +18,7 @@ _KIND = "act_joint_"  # a training configuration of joint space stands for those
 
 Count = Annotated[StrictInt, Field(ge=1)]
 Seed = Annotated[StrictInt, Field(ge=0)]
+Width = Annotated[StrictFloat, Field(gt=0, allow_inf_nan=False)]
 Names = tuple[StrictStr, ...]
 
 
@@ -26,11 +28,17 @@ class GridError(ErIlError):
 
 @dataclass(frozen=True)
 class Cell:
-    """A task and a decoder, with policies trained on so many demonstrations."""
+    """A task and a decoder, with policies trained on so many demonstrations, rolled out within so wide a square."""
 
     task: str
     decoder: str
     demonstrations: int
+    within: float | None = None  # [m] side of the square in which the object starts; the task's own range if None
+
+    @property
+    def labels(self) -> dict[str, Any]:
+        """What results call the cell."""
+        return {name: value for name, value in vars(self).items() if value is not None}
 
 
 class Grid(Declaration):
@@ -54,6 +62,9 @@ class Grid(Declaration):
     episodes: Count | None = None  # to record a task, those held out included; as many as its recipe says if None
     recording_seed: Seed = 0  # of the demonstrations
     steps: Count | None = None  # of training; as many as the space's configuration says if None
+    # [m] sides of the squares in which the object starts in rollouts, whatever its range was in the demonstrations;
+    # the task's own range if empty
+    within: tuple[Width, ...] = ()
     introduction: StrictStr = ""  # a paragraph for the page
     arm: StrictStr = "panda"
     configuration: StrictStr = ""  # kind of training, such as images_small: configs/act_<space>_images_small.yaml
@@ -69,11 +80,12 @@ class Grid(Declaration):
             if name in POSTURE_BASELINES:
                 raise GridError(f"{name} stands among the decoders; list it under posture_baselines.")
             space_of(name)  # raises if unknown
-        for key in ("tasks", "decoders", "training_seeds", "demonstrations", "posture_baselines"):
+        for key in ("tasks", "decoders", "training_seeds", "demonstrations", "posture_baselines", "within"):
             values = getattr(self, key)
             if twice := sorted({str(value) for value in values if values.count(value) > 1}):
                 raise GridError(f"{key} names {', '.join(twice)} twice.")
         self._check_images()
+        self._check_widths()
         for task in self.tasks:  # raises if unknown
             recipe, most = self.recipe(task), max(self.demonstrations)
             if most > (available := recipe.episodes - recipe.validation):
@@ -90,6 +102,20 @@ class Grid(Declaration):
         if (self.configuration or self.cameras) and (blind or not self.configuration):
             missing = f"the cameras of {', '.join(blind)}" if blind else f"configuration, one of {', '.join(kinds)}"
             raise GridError(f"To learn from images, a grid needs configuration and cameras; it lacks {missing}.")
+
+    def _check_widths(self) -> None:
+        if not self.within:
+            return
+        if len(self.demonstrations) > 1:
+            raise GridError("A grid varies either demonstrations or within, not both.")
+        if unplaced := [task for task in self.tasks if not takes_option(task, WITHIN)]:
+            known = ", ".join(task for task in task_names() if takes_option(task, WITHIN))
+            raise GridError(f"within is for tasks that place a cup: {known}; not for {', '.join(unplaced)}.")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON or YAML, without ``within`` where it is empty: as before there was that key."""
+        values = super().to_dict()
+        return values if self.within else {key: value for key, value in values.items() if key != "within"}
 
     def recipe(self, task: str) -> Recipe:
         """Recipe of a task's demonstrations."""
@@ -110,9 +136,10 @@ class Grid(Declaration):
     def cells(self) -> tuple[Cell, ...]:
         """The cells, task by task, the posture baselines last."""
         return tuple(
-            Cell(task, name, count)
+            Cell(task, name, count, width)
             for task in self.tasks
             for count in self.demonstrations
+            for width in self.within or (None,)
             for name in (*self.decoders, *self.posture_baselines)
         )
 

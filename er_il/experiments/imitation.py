@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from er_il.evaluation.results import COLUMNS, load_notes, report_cells
+from er_il.evaluation.results import load_notes, report_cells
 from er_il.evaluation.rollout import FIRST_SEED
 from er_il.experiments.films import films, show
 from er_il.experiments.grid import Cell
@@ -48,11 +48,12 @@ class Imitation:
 
     def summary(self, cell: Cell) -> str:
         success = self.plan.rollouts(cell)["success"]
-        return f"{cell.task} {cell.decoder}, trained on {cell.demonstrations}: {success.sum()}/{len(success)}"
+        start = "" if cell.within is None else f", within {cell.within:g} m"
+        return f"{cell.task} {cell.decoder}, trained on {cell.demonstrations}{start}: {success.sum()}/{len(success)}"
 
     def results(self) -> "tuple[dict[str, Any], pd.DataFrame, Sequence[str]]":
         rollouts = self.plan.rollouts(*self.plan.complete)
-        return {"meta": _meta(self.plan), "cells": report_cells(rollouts)}, rollouts, COLUMNS
+        return {"meta": _meta(self.plan), "cells": report_cells(rollouts)}, rollouts, ()
 
     def films(self, all_of_them: bool) -> Mapping[str, Sequence[Film]]:
         return films(self.plan, self.plan.grid.decoders if all_of_them else FILMED)
@@ -83,5 +84,5 @@ def _meta(plan: Plan) -> dict[str, Any]:
             "rollouts": sum(job.size for job in rollouts),
             "rollout_cpu_s": round(sum(notes["cost"]["cpu"] for notes in rolled_out)),
         },
-        "missing": [vars(cell) for cell in grid.cells if cell not in complete],
+        "missing": [cell.labels for cell in grid.cells if cell not in complete],
     }

@@ -20,7 +20,6 @@ from er_il.experiments.schedule import Job, notes
 from er_il.kinematics.rotation import Quaternion
 from er_il.policy.configuration import default_config
 from er_il.policy.training import PRECISION, Training, train_episodes
-from er_il.spaces.registry import ERX
 from er_il.support.atomic_files import write_json
 from er_il.support.cost import measured
 from er_il.support.errors import ErIlError
@@ -55,12 +54,14 @@ class Demonstrate(Job):
 
 @dataclass(frozen=True)
 class FitWeights(Job):
-    """Fit ERX's weights to the demonstrations that a policy is trained on, and to these alone: a dataset in ERX.
+    """Fit ERX's weights to the demonstrations that a policy is trained on, and to these alone: a dataset in ERX, or in
+    its chunk-relative form.
 
     The others are encoded by the same weights.
     """
 
     needs: tuple[Demonstrate]
+    space: str
     demonstrations: int  # the first ones of the training episodes
 
     stage = "Fit"
@@ -89,7 +90,7 @@ class FitWeights(Job):
             for part in known.parts
         }
         with SuppressProgressBars():
-            encode_dataset(source, self.path, known.in_space(ERX, Quaternion.kind, weights))
+            encode_dataset(source, self.path, known.in_space(self.space, Quaternion.kind, weights))
 
 
 @dataclass(frozen=True)
@@ -139,6 +140,7 @@ class RollOut(Job):
     needs: tuple[Train]
     decoder: str  # a decoder, or a posture baseline
     first_seed: int  # of the initial states
+    within: float | None = None  # [m] see Cell
 
     stage = "Roll out"
 
@@ -158,6 +160,7 @@ class RollOut(Job):
                 seed=self.first_seed,
                 posture=posture(leader).tolist() if posture else (),
                 elbow=elbow,
+                within=self.within,
             )
         save_rollouts(rollouts, self.path, notes(cost))
 
@@ -169,6 +172,7 @@ class Film(Job):
     needs: tuple[Train]
     decoder: str
     seed: int  # of the initial state
+    within: float | None = None  # [m] see Cell
 
     stage = "Film"
 
@@ -183,7 +187,8 @@ class Film(Job):
         from er_il.viewer.show import save_rollout
 
         training, (film, recording, path) = self.needs[0].training, self.files
-        trace, pictures = record_rollout(training.policy, training.task, self.decoder, self.seed, FILM_EVERY)
+        shown = training.policy, training.task, self.decoder, self.seed, FILM_EVERY, self.within
+        trace, pictures = record_rollout(*shown)
         write_film(pictures, film, round(1 / trace.period / FILM_EVERY))
         save_rollout(trace, recording)
         trace.save(path)

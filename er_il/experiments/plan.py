@@ -19,6 +19,7 @@ from er_il.experiments.jobs import Demonstrate, FitWeights, RollOut, Train
 from er_il.experiments.owner import OWNER, claimed, owner_of
 from er_il.policy.configuration import default_config, default_steps, read_config
 from er_il.policy.rows import POLICY_ROWS
+from er_il.spaces.chunk import commands_of
 from er_il.spaces.joint import JOINT
 from er_il.spaces.registry import ERX
 from er_il.support.errors import ErIlError
@@ -75,7 +76,7 @@ class Plan:
     @cached_property
     def _demonstrations(self) -> dict[str, Demonstrate]:
         # Weights of ERX belong to the demonstrations that a policy sees: see _source.
-        spaces = tuple(space for space in self.grid.spaces if space != ERX) or (JOINT,)
+        spaces = tuple(space for space in self.grid.spaces if commands_of(space) != ERX) or (JOINT,)
         folder, jobs = self.out / "datasets", {}
         for task in self.grid.tasks:
             recipe, name = self.grid.recipe(task), f"demonstrate {task}"
@@ -85,10 +86,13 @@ class Plan:
     def _source(self, cell: Cell) -> Demonstrate | FitWeights:
         """What makes the dataset of a cell's policy."""
         demonstrated, count = self._demonstrations[cell.task], cell.demonstrations
-        if space_of(cell.decoder) != ERX:
+        space = space_of(cell.decoder)
+        if commands_of(space) != ERX:
             return demonstrated
-        path = self.out / "fitted" / cell.task / f"{ERX}-{count}-demonstrations"
-        return FitWeights(path, f"fit {ERX} to {count} demonstrations of {cell.task}", (demonstrated,), 1, count)
+        path = self.out / "fitted" / cell.task / f"{space}-{count}-demonstrations"
+        return FitWeights(
+            path, f"fit {space} to {count} demonstrations of {cell.task}", (demonstrated,), 1, space, count
+        )
 
     def training(self, cell: Cell, seed: int) -> Train:
         """The training of a cell's policy."""
@@ -110,12 +114,14 @@ class Plan:
     def _rolling_out(self, cell: Cell) -> Iterator[RollOut]:
         end = FIRST_SEED + self.grid.rollouts
         for trained in (self.training(cell, seed) for seed in self.grid.seeds_of(cell)):
-            folder = self.out / "rollouts" / cell.task / cell.decoder / trained.path.stem
+            width = "" if cell.within is None else f"-within-{cell.within:g}"
+            folder = self.out / "rollouts" / cell.task / cell.decoder / f"{trained.path.stem}{width}"
             for first in range(FIRST_SEED, end, POLICY_ROWS):
                 count = min(POLICY_ROWS, end - first)
                 last = first + count - 1
-                name = f"roll out {cell.decoder} from {first} to {last} ({trained.name})"
-                yield RollOut(folder / f"{first}-{last}.json", name, (trained,), count, cell.decoder, first)
+                name = f"roll out {cell.decoder} from {first} to {last}{width.replace('-', ' ')} ({trained.name})"
+                path = folder / f"{first}-{last}.json"
+                yield RollOut(path, name, (trained,), count, cell.decoder, first, cell.within)
 
     @cached_property
     def targets(self) -> dict[Cell, list[RollOut]]:
@@ -137,7 +143,7 @@ class Plan:
         from er_il.evaluation.results import load_rollouts, long_form  # pandas: a second that mistakes do without
 
         return long_form(
-            (vars(cell) | {"training_seed": job.needs[0].seed}, load_rollouts(job.path))
+            (cell.labels | {"training_seed": job.needs[0].seed}, load_rollouts(job.path))
             for cell in cells
             for job in self.targets[cell]
         )

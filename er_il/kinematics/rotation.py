@@ -1,4 +1,4 @@
-"""Rotations as numbers a policy can learn: unit quaternions, or the first two matrix columns (6D).
+"""Rotations as numbers a policy can learn: unit quaternions, or the first two columns or rows of the matrix (6D).
 
 Quaternions are (x, y, z, w). q and -q are the same rotation, and a policy that sees both for one
 orientation learns their useless mean. :class:`Quaternion` therefore has a reference orientation:
@@ -36,7 +36,7 @@ class RotationCode(ABC):
 
     @abstractmethod
     def encode(self, R: Array) -> Array:
-        """Encode a trajectory of rotation matrices (N, 3, 3) as (N, len(names))."""
+        """Encode trajectories of rotation matrices (..., N, 3, 3), one or many at once, as (..., N, len(names))."""
 
     @abstractmethod
     def decode(self, code: Array) -> Array:
@@ -68,10 +68,11 @@ class Quaternion(RotationCode):
     names = ("ee.qx", "ee.qy", "ee.qz", "ee.qw")
 
     def encode(self, R: Array) -> Array:
-        quaternions = Rotation.from_matrix(R).as_quat()
-        previous = np.vstack([np.asarray(self.reference)[None], quaternions[:-1]])
-        turns = np.where(np.sum(previous * quaternions, axis=1) < 0, -1.0, 1.0)
-        return quaternions * np.cumprod(turns)[:, None]
+        quaternions = Rotation.from_matrix(R.reshape(-1, 3, 3)).as_quat().reshape(*R.shape[:-2], 4)
+        first = np.broadcast_to(self.reference, (*R.shape[:-3], 1, 4))
+        previous = np.concatenate([first, quaternions[..., :-1, :]], axis=-2)
+        turns = np.where(np.sum(previous * quaternions, axis=-1) < 0, -1.0, 1.0)
+        return quaternions * np.cumprod(turns, axis=-1)[..., None]
 
     def decode(self, code: Array) -> Array:
         x, y, z, w = code.tolist()
@@ -95,7 +96,7 @@ class Rot6d(RotationCode):
     names = ("ee.r11", "ee.r21", "ee.r31", "ee.r12", "ee.r22", "ee.r32")
 
     def encode(self, R: Array) -> Array:
-        return R[:, :, :2].transpose(0, 2, 1).reshape(-1, 6)
+        return R[..., :2].swapaxes(-2, -1).reshape(*R.shape[:-2], 6)
 
     def decode(self, code: Array) -> Array:
         x = _unit(code[:3])
@@ -106,6 +107,31 @@ class Rot6d(RotationCode):
         x, straight = _units(code[:3], xp)
         y, across = _units(code[3:] - x * xp.sum(x * code[3:], axis=0), xp)
         return xp.stack([x, y, xp.stack(cross(tuple(x), tuple(y)), axis=0)], axis=1), straight & across
+
+
+@dataclass(frozen=True)
+class Rot6dRows(RotationCode):
+    """First two rows of the rotation matrix: the same numbers as the columns of its inverse.
+
+    Many data sets call these the 6D rotation, such as those that were written with PyTorch3D.
+    """
+
+    kind = "rot6d_rows"
+    names = ("ee.r11", "ee.r12", "ee.r13", "ee.r21", "ee.r22", "ee.r23")
+
+    def encode(self, R: Array) -> Array:
+        return R[..., :2, :].reshape(*R.shape[:-2], 6)
+
+    def decode(self, code: Array) -> Array:
+        return _BY_COLUMNS.decode(code).T
+
+    def decode_batch(self, code: Any, xp: Any) -> tuple[Any, Any]:
+        R, rotates = _BY_COLUMNS.decode_batch(code, xp)
+        return xp.permute_dims(R, (1, 0, 2)), rotates
+
+
+_BY_COLUMNS = Rot6d()
+ROTATIONS = (Quaternion.kind, Rot6d.kind, Rot6dRows.kind)
 
 
 def _units(v: Any, xp: Any) -> tuple[Any, Any]:
@@ -146,5 +172,7 @@ def make_rotation(kind: str, reference: Array) -> RotationCode:
         x, y, z, w = Rotation.from_matrix(reference).as_quat().tolist()
         return Quaternion((x, y, z, w))
     if kind == Rot6d.kind:
-        return Rot6d()
-    raise UnknownNameError("rotation", kind, [Quaternion.kind, Rot6d.kind])
+        return _BY_COLUMNS
+    if kind == Rot6dRows.kind:
+        return Rot6dRows()
+    raise UnknownNameError("rotation", kind, ROTATIONS)

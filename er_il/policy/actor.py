@@ -12,7 +12,7 @@ import torch
 from huggingface_hub.constants import SAFETENSORS_SINGLE_FILE
 from lerobot.configs import FeatureType, PreTrainedConfig
 from lerobot.envs import preprocess_observation
-from lerobot.policies import PreTrainedPolicy, make_policy, make_pre_post_processors
+from lerobot.policies import PreTrainedPolicy, make_policy
 from lerobot.utils.constants import OBS_IMAGES
 from safetensors.torch import load_model
 from threadpoolctl import threadpool_limits
@@ -22,12 +22,18 @@ from er_il.envs.contract import decoder_for, policy_contract
 from er_il.envs.learning import RATE
 from er_il.envs.lerobot_plugin import ErIlEnvConfig
 from er_il.envs.origin import training_info
+from er_il.policy.chunk_pipelines import make_pre_post_processors
 from er_il.policy.rows import POLICY_ROWS
 from er_il.support.errors import PolicyError
 
 
 def environment_of(
-    policy: Path, task: str, decoder_name: str, on_invalid: str = BEST_EFFORT, posture: Sequence[float] = ()
+    policy: Path,
+    task: str,
+    decoder_name: str,
+    on_invalid: str = BEST_EFFORT,
+    posture: Sequence[float] = (),
+    within: float | None = None,
 ) -> ErIlEnvConfig:
     """Describe the environment that a policy needs: its arm, its rotation code, its cameras, its rate.
 
@@ -49,6 +55,7 @@ def environment_of(
         on_invalid=on_invalid,
         cameras=[key.removeprefix(f"{OBS_IMAGES}.") for key in images],
         image_size=sizes.pop() if sizes else ErIlEnvConfig.image_size,
+        within=within or 0.0,
     )
 
 

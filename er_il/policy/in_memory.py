@@ -17,7 +17,7 @@ from lerobot.datasets import LeRobotDataset
 from lerobot.scripts import lerobot_train
 
 from datasets import Dataset
-from er_il.policy import safeguards
+from er_il.policy import chunk_pipelines, safeguards
 from er_il.support.failures import REPORT, explanation
 
 SHARE = 0.5  # of the free memory that images may take
@@ -88,6 +88,7 @@ def main() -> None:
         return both
 
     lerobot_train.make_train_eval_datasets = make_in_memory
+    chunk_pipelines.install()
     safeguards.install()
     mistake = None
     try:

@@ -103,14 +103,24 @@ def success_figure(cells: Cells, *, compared: bool = False) -> Figure:
 @styled
 def demonstrations_figure(cells: Cells) -> Figure:
     """Success over the number of demonstrations, a panel per task and a line per decoder."""
+    return _curves(success_data(cells), "Training demonstrations", log=True)
+
+
+@styled
+def widths_figure(cells: Cells) -> Figure:
+    """Success over the width of the square in which the cup starts, a panel per task and a line per decoder."""
     data = success_data(cells)
+    return _curves(data.assign(x=100 * data["within"]), "Cup placed within a square of [cm]")
+
+
+def _curves(data: pd.DataFrame, over: str, *, log: bool = False) -> Figure:
     looks, tasks = looks_of(data["series"].unique()), data["group"].unique()
     figure = Figure(figsize=(1 + 3.4 * len(tasks), 3.8))
     axes = figure.subplots(1, len(tasks), squeeze=False, sharey=True)[0]
     for task, axis in zip(tasks, axes, strict=True):
-        curve_chart(axis, where(data, group=task), looks, log=True)
+        curve_chart(axis, where(data, group=task), looks, log=log)
         percent_axis(axis)
-        axis.set(xlabel="Training demonstrations", title=task)
+        axis.set(xlabel=over, title=task)
     axes[0].set_ylabel("Success rate [%]")
     legend(figure)
     return figure

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from er_il.evaluation.results import EPISODES, RESULTS
 from er_il.report import paper
-from er_il.report.charts import demonstrations_figure, success_figure
+from er_il.report.charts import demonstrations_figure, success_figure, widths_figure
 from er_il.report.style import save
 from er_il.report.tables import markdown_table
 from er_il.report.text import render, table
@@ -20,9 +20,13 @@ def write_pages(folder: Path) -> None:
     cells, grid = report["cells"], report["meta"]["grid"]
     if not cells:
         return
-    varied = len(grid["demonstrations"]) > 1
+    few, wide = len(grid["demonstrations"]) > 1, len(grid.get("within", [])) > 1
     compared = grid["arm"] == paper.ARM and any(task in paper.SUCCESSES for task in grid["tasks"])
-    figure = demonstrations_figure(cells) if varied else success_figure(cells, compared=compared)
+    varied = few or wide
+    if varied:
+        figure = demonstrations_figure(cells) if few else widths_figure(cells)
+    else:
+        figure = success_figure(cells, compared=compared)
     picture = "curves.png" if varied else "table.png"
     save(figure, folder / picture)
     (folder / TABLE).write_text(markdown_table(table("success", **report)) + "\n")

@@ -51,6 +51,12 @@ LOOKS = {
     "erx-free": Look("ERX, free", BLUE, DASHED),
     "jailer": Look("JAiLeR", GREY),
     "jailer-rew": Look("JAiLeR (+rew)", INK),
+    # Chunk-relative forms: the same hue, darker, and dashed where lines are drawn.
+    "rel_joint": Look("Relative joint", "#1F78B4", DASHED),
+    "rel_erj": Look("Relative ERJ", "#00573F", DASHED),
+    "rel_era": Look("Relative ERA", "#7A3F63", DASHED),
+    "rel_erx": Look("Relative ERX", "#003A5C", DASHED),
+    "rel_task-nearest": Look("Relative task (nearest)", "#8A5F00", DASHED),
 }
 
 

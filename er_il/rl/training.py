@@ -180,7 +180,7 @@ class _Run(BaseCallback):
             self._pause()
             # New episodes, as after an interruption here: whether there was one makes no difference.
             self._seed_starts()
-            self._sac._last_obs = self._environments.reset()
+            self._sac._last_obs = self._environments.reset()  # pyright: ignore[reportAttributeAccessIssue]  no tuple
 
     def _on_training_end(self) -> None:
         if not self._milestones or self._milestones[-1].steps < self.num_timesteps:

@@ -27,6 +27,7 @@ class RobotCommand:
     leader: str = ""  # type of the teleoperator
     dataset: str = ""  # that it records or replays
     strategy: str = ""  # of a rollout
+    inference: str = ""  # of a rollout, such as "rtc"
 
     @classmethod
     def read(cls, arguments: Sequence[str]) -> "RobotCommand":
@@ -44,6 +45,7 @@ class RobotCommand:
             leader=said("teleop.type"),
             dataset=said("dataset.repo_id"),
             strategy=said("strategy.type"),
+            inference=said("inference.type"),
         )
 
 

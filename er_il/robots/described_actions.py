@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,7 @@ from er_il.datasets.schema import dimension_names
 from er_il.envs.contract import Contract, policy_tags, read_policy_config
 from er_il.envs.origin import INFO, at_hand, dataset_info, training_info
 from er_il.policy.training import pretrained
+from er_il.spaces.chunk import commands_of
 from er_il.spaces.layout import Layout
 from er_il.spaces.spec import ACTION, action_spec
 from er_il.support.errors import DatasetError, ErIlError, PolicyError, SpecError
@@ -70,7 +71,8 @@ def check_policy(policy: str, layout: Layout) -> None:
     if trained_for is not None:
         got, needed = _meaning(trained_for), _meaning(layout)
     elif (tagged := Contract.of_tags(policy_tags(policy))) and len(layout.parts) == 1:
-        got, needed = tagged.tag, Contract.of_space(layout.parts[0].space).tag
+        got = replace(tagged, space=commands_of(tagged.space)).tag  # its processors make relative actions absolute
+        needed = Contract.of_space(layout.parts[0].space).tag
     else:
         got, needed = _width(policy), f"{len(layout.encoded_names)} dimensions"
     if got != needed:

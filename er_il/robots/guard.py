@@ -16,11 +16,12 @@ import numpy as np
 from safetensors import safe_open
 
 from er_il.datasets.schema import LEADER_JOINTS, SOURCE_ACTION, SOURCE_JOINTS
-from er_il.envs.contract import Contract, decodes, policy_tags, read_policy_config
+from er_il.envs.contract import Contract, chunk_relative, decodes, policy_tags, read_policy_config
 from er_il.envs.origin import at_hand, policy_file, training_info
 from er_il.envs.trust import POSTPROCESSOR, read_processor
 from er_il.rl.modes import AGENT
 from er_il.robots.command_line import DECODING_ROBOT, RobotCommand
+from er_il.spaces.chunk import commands_of
 from er_il.spaces.joint import JOINT
 from er_il.spaces.spec import ACTION, action_spec
 from er_il.support.errors import DatasetError, ErIlError, PolicyError
@@ -28,6 +29,7 @@ from er_il.support.errors import DatasetError, ErIlError, PolicyError
 logger = logging.getLogger(__name__)
 
 UNKNOWN = "an unknown"
+REAL_TIME_CHUNKING = "rtc"
 CLOSE = 0.05  # [units of the joints] between the means of actions that are joints and of these joints
 
 
@@ -53,13 +55,28 @@ def check(command: RobotCommand) -> None:
     """Refuse a command that would send encoded actions to joints, or record joints as encoded actions.
 
     Raises:
-        PolicyError: the policy was trained in an ER or task space, and nothing decodes its actions.
+        PolicyError: the policy was trained in an ER or task space, and nothing decodes its actions; or it acts
+            chunk-relative where LeRobot does not let it.
         DatasetError: a leader's joints would be recorded by a robot that takes encoded actions.
     """
+    if command.robot and command.policy:
+        _check_chunks(command)
     if command.robot == DECODING_ROBOT:
         _check_decoding(command)
     elif command.robot and command.policy:
         _check_policy(command)
+
+
+def _check_chunks(command: RobotCommand) -> None:
+    """Refuse chunk-relative actions where chunks meet: LeRobot knows no state that those of a chunk count from."""
+    if not ((command.served or command.inference == REAL_TIME_CHUNKING) and at_hand(command.policy)):
+        return
+    if chunk_relative(command.policy):
+        where = "LeRobot's policy server loads no plugins" if command.served else "Real-time chunking joins chunks"
+        raise PolicyError(
+            f"The policy {command.policy} acts chunk-relative. {where}, and cannot convert its actions: run it with "
+            "lerobot-rollout --inference.type=sync, or train it in an absolute space."
+        )
 
 
 def _check_policy(command: RobotCommand) -> None:
@@ -70,7 +87,7 @@ def _check_policy(command: RobotCommand) -> None:
             "Record its rollouts (er-il generate TASK --agent), and train a policy on them."
         )
     space = action_space_of(policy)
-    if space in (None, JOINT):
+    if space is None or commands_of(space) == JOINT:
         return
     attached = decodes(policy)
     robot = (

@@ -8,7 +8,7 @@ from typing import Any
 
 from lerobot.processor import RelativeActionsProcessorStep
 
-from er_il.envs.contract import DECODE_POLICY_ACTION
+from er_il.envs.contract import DECODE_POLICY_ACTION, RELATIVE_ACTIONS
 from er_il.envs.trust import POSTPROCESSOR, PREPROCESSOR, read_processor
 from er_il.robots.processors import DecodePolicyAction
 from er_il.support.atomic_files import atomic_folder
@@ -40,7 +40,7 @@ def write_copy(
 def _with_state_kept(steps: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Add the step that keeps the raw state, where names are final and nothing is normalised yet."""
     names = [step.get("registry_name") for step in steps]
-    if _KEEP_STATE in names:
+    if not {_KEEP_STATE, RELATIVE_ACTIONS}.isdisjoint(names):
         return steps
     at = names.index(_RENAME) + 1 if _RENAME in names else 0
     return [*steps[:at], _entry(_KEEP_STATE, RelativeActionsProcessorStep(enabled=False).get_config()), *steps[at:]]

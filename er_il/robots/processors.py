@@ -64,7 +64,7 @@ def measured_names(layout: Layout) -> dict[str, str]:
     """
     names = {name: name for name in layout.other_dimensions}
     for part in layout.parts:
-        names |= dict(zip(part.motors.joints, part.motors.state or part.motors.joints, strict=True))
+        names |= dict(zip(part.motors.joints, part.motors.measured, strict=True))
     return names
 
 

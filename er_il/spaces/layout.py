@@ -18,6 +18,7 @@ from er_il.arms.arm import Arm, Weights
 from er_il.arms.portable import arm_from_spec, arm_spec
 from er_il.kinematics.solver import BatchResult, IkResult
 from er_il.spaces.base import ArmSpace
+from er_il.spaces.chunk import CHUNK, RELATIVE, chunk_of, commands_of
 from er_il.spaces.joint import JOINT, JointSpace
 from er_il.spaces.motors import Motors
 from er_il.spaces.references import fitted
@@ -58,12 +59,16 @@ class Layout:
 
     In joint space the encoded vector is the joint vector itself: the robot's names, order and units.
 
+    Chunk-relative actions (:mod:`er_il.spaces.relative`) are encoded as the others. That policies see chunks of
+    ``chunk`` of them relative to the state changes the layout's kind alone: ``rel_erj`` for ``erj``.
+
     Raises:
         DatasetError: arms share a dimension or a label, or use one that is not there.
     """
 
     names: tuple[str, ...]  # of the joint vector
     parts: tuple[Part, ...]
+    chunk: int = 0  # number of actions that policies see relative to one state; 0: absolute ones
 
     def __post_init__(self) -> None:
         used = [joint for part in self.parts for joint in part.motors.joints]
@@ -88,7 +93,7 @@ class Layout:
         return cls.of_spaces({"": space})
 
     @classmethod
-    def of_spaces(cls, spaces: Mapping[str, ArmSpace]) -> "Layout":
+    def of_spaces(cls, spaces: Mapping[str, ArmSpace], chunk: int = 0) -> "Layout":
         """Several arms by their labels, each one's joints [rad] in order, then its gripper: what er_il records."""
         names: list[str] = []
         parts = []
@@ -96,11 +101,16 @@ class Layout:
             joints = JointSpace(space.arm).names
             names += [*joints, f"{label}_{GRIPPER}" if label else GRIPPER]
             parts.append(Part(label, space, Motors(joints, state=joints)))
-        return cls(tuple(names), tuple(parts))
+        return cls(tuple(names), tuple(parts), chunk)
 
     @property
     def kind(self) -> str:
         """Kind of action space, the same for all arms."""
+        return RELATIVE * bool(self.chunk) + self.commands
+
+    @property
+    def commands(self) -> str:
+        """Kind of action space that decodes: that of the encoded vectors themselves, however policies see them."""
         return self.parts[0].space.kind
 
     @cached_property
@@ -123,7 +133,7 @@ class Layout:
 
     @cached_property
     def _joints(self) -> bool:
-        return self.kind == JOINT
+        return self.commands == JOINT
 
     def indices(self, part: Part) -> NDArray[np.int_]:
         """Positions of an arm's joints in the joint vector."""
@@ -142,17 +152,21 @@ class Layout:
         """The arms by their labels."""
         return {part.label: part.space.arm for part in self.parts}
 
-    def in_space(self, kind: str, rotation: str, weights: Mapping[str, Weights] = MappingProxyType({})) -> "Layout":
+    def in_space(
+        self, kind: str, rotation: str, weights: Mapping[str, Weights] = MappingProxyType({}), chunk: int = CHUNK
+    ) -> "Layout":
         """The same layout in another action space (see :func:`er_il.spaces.registry.make_arm_space`).
 
         Args:
             kind: Name of the space.
-            rotation: ``quat`` or ``rot6d``.
+            rotation: ``quat``, ``rot6d`` or ``rot6d_rows``.
             weights: Of ERX's coordinates, by the arm's label; those of the arms where it says nothing.
+            chunk: Number of actions of a chunk, in a chunk-relative space.
         """
         arms = self.arms | {label: self.arms[label].weighing(rows) for label, rows in weights.items()}
         spaces = {label: make_arm_space(kind, arm, rotation=rotation) for label, arm in arms.items()}
-        return replace(self, parts=tuple(replace(part, space=spaces[part.label]) for part in self.parts))
+        parts = tuple(replace(part, space=spaces[part.label]) for part in self.parts)
+        return replace(self, parts=parts, chunk=chunk_of(kind, chunk))
 
     def split(self, vector: Array) -> tuple[list[Array], Array]:
         """Split joint vectors (..., D) into each arm's angles (..., n) [rad] and the other dimensions (..., k)."""
@@ -236,8 +250,9 @@ class Layout:
             names = [*part.space.names, GRIPPER]  # version 1 names a gripper with each arm, also where there is none
             specs.append(space | {"arm": space["arm"] | arm_spec(part.space.arm), "names": names})
         first = self.parts[0]
+        relative = {"space": self.kind, "chunk": self.chunk} if self.chunk else {}
         if not first.label and first.motors.plain and self.names == self.of_space(first.space).names:
-            return specs[0]
+            return specs[0] | relative
         arms = [
             {"label": part.label, "motors": part.motors.spec(), **spec}
             for part, spec in zip(self.parts, specs, strict=True)
@@ -248,6 +263,7 @@ class Layout:
             "names": list(self.encoded_names),
             "joint_names": list(self.names),
             "arms": arms,
+            **relative,
         }
 
     @classmethod
@@ -260,10 +276,16 @@ class Layout:
         check_types(spec)
         try:
             if "arms" not in spec:
-                return cls.of_space(arm_space_from_spec(spec, arm_from_spec(spec["arm"])))
-            return cls(tuple(spec["joint_names"]), tuple(map(_part_from_spec, spec["arms"])))
+                space = arm_space_from_spec(spec, arm_from_spec(spec["arm"]))
+                return cls.of_spaces({"": space}, _chunk_from_spec(spec))
+            parts = tuple(map(_part_from_spec, spec["arms"]))
+            return cls(tuple(spec["joint_names"]), parts, _chunk_from_spec(spec))
         except (KeyError, TypeError) as error:
             raise SpecError(f"The action spec is incomplete or damaged ({error}).") from error
+
+
+def _chunk_from_spec(spec: Mapping[str, Any]) -> int:
+    return spec["chunk"] if commands_of(spec["space"]) != spec["space"] else 0
 
 
 def _part_from_spec(spec: Mapping[str, Any]) -> Part:

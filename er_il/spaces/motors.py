@@ -46,6 +46,11 @@ class Motors:
         """True if values are the URDF's angles without conversion."""
         return self.units == "rad" and all(s == 1 for s in self.signs) and not any(self.offsets)
 
+    @property
+    def measured(self) -> tuple[str, ...]:
+        """Names of the measured values in the state; where nothing says others, those of the commanded ones."""
+        return self.state or self.joints
+
     def angles(self, values: ArrayLike) -> Array:
         """Angles (..., n) [rad] of the URDF's joints from the robot's values (..., n)."""
         return UNITS[self.units] * (np.asarray(values, dtype=np.float64) * self._signs + self._offsets)

@@ -14,6 +14,7 @@ from er_il.kinematics.rotation import Quaternion, RotationCode, make_rotation
 from er_il.kinematics.solver import kinematics_of
 from er_il.spaces.base import ArmSpace
 from er_il.spaces.carried import CARRIED, CarriedDeltaSpace
+from er_il.spaces.chunk import RELATIVE, commands_of
 from er_il.spaces.delta import PREFIX, DeltaBounds, DeltaSpace
 from er_il.spaces.joint import JOINT, JointSpace
 from er_il.spaces.margin import home_weights
@@ -46,11 +47,12 @@ REDUNDANCIES: dict[str, Callable[[Arm], Redundancy]] = {  # of the ER spaces
 }
 CARRIERS = (ERJ, ERX)  # whose changes can carry the pose's target along
 SPACES = (JOINT, TASK, *REDUNDANCIES)
-RELATIVE: dict[str, type[DeltaSpace]] = {PREFIX: DeltaSpace, CARRIED: CarriedDeltaSpace}  # by the prefix of the name
+DELTAS: dict[str, type[DeltaSpace]] = {PREFIX: DeltaSpace, CARRIED: CarriedDeltaSpace}  # by the prefix of the name
 
 AT, AND = "@", "+"  # as in erj@panda_joint3, or erj@panda_joint1+panda_joint3 with two redundant joints
 THEN = ":"  # between the weights of a row, as in erx@0.8:-0.6:0:0:0:0:0
 PLAIN = tuple(space for space in SPACES if AT not in space)  # no variants of others
+CHUNK_RELATIVE = tuple(RELATIVE + space for space in SPACES)
 
 
 def make_arm_space(
@@ -64,13 +66,14 @@ def make_arm_space(
     """Build the action space of an arm, without a gripper, by name.
 
     Args:
-        name: ``joint``, ``task``, ``erj``, ``era`` or ``erx``; with ``delta_`` in front, changes of its commands, and
-            with ``carried_`` such that the pose's target moves along with ERJ's joint or ERX's coordinates
+        name: ``joint``, ``task``, ``erj``, ``era`` or ``erx``; with ``rel_`` in front, the same commands, which
+            policies see relative to the state (:mod:`er_il.spaces.relative`). With ``delta_``, changes of its commands,
+            and with ``carried_`` such that the pose's target moves along with ERJ's joint or ERX's coordinates
             (:mod:`er_il.spaces.carried`). ``erj@<joint>`` commands another than the arm's default joint; several are
             joined by ``+``. ``era@stereo`` counts the arm angle from the stereographic reference. ``erx@<weights>`` has
             other weights than the arm's (:func:`erx_name`).
         arm: The arm it commands.
-        rotation: ``quat`` or ``rot6d``; the quaternion's hemisphere is that of the arm's home pose.
+        rotation: ``quat``, ``rot6d`` or ``rot6d_rows``; the quaternion's hemisphere is that of the arm's home pose.
             Deltas always use a rotation vector.
         posture: (n,) [rad] null-space posture for ``task``; without it IK stays near the seed.
         bounds: Largest changes of a delta space; by default what the arm can do in a period of 20 Hz.
@@ -86,7 +89,7 @@ def make_arm_space(
     code = make_rotation(rotation, kinematics_of(arm).fk(arm.home)[:3, :3])
     prefix, absolute = _split_kind(kind)
     space = _absolute(absolute, arm, code, posture)
-    return RELATIVE[prefix](arm, space, bounds or DeltaBounds.of_arm(arm)) if prefix else space
+    return DELTAS[prefix](arm, space, bounds or DeltaBounds.of_arm(arm)) if prefix in DELTAS else space
 
 
 def split_name(name: str) -> tuple[str, tuple[str, ...]]:
@@ -100,7 +103,7 @@ def split_name(name: str) -> tuple[str, tuple[str, ...]]:
     prefix, absolute = _split_kind(kind)
     if absolute not in SPACES or (prefix == CARRIED and absolute not in CARRIERS):
         deltas = [*(PREFIX + space for space in SPACES), *(CARRIED + space for space in CARRIERS)]
-        raise UnknownNameError("action space", kind, [*SPACES, *deltas])
+        raise UnknownNameError("action space", kind, [*SPACES, *CHUNK_RELATIVE, *deltas])
     if not at:
         return kind, ()
     choice = tuple(said.split(AND))
@@ -128,15 +131,15 @@ def _weights(rows: Sequence[str]) -> Weights:
 
 
 def _split_kind(kind: str) -> tuple[str, str]:
-    """Split a kind into the prefix of its changes, "" for an absolute space, and the absolute space's kind."""
-    prefix = next((prefix for prefix in RELATIVE if kind.startswith(prefix)), "")
+    """Split a kind into its prefix, "" for an absolute space, and the absolute space's kind."""
+    prefix = next((prefix for prefix in (RELATIVE, *DELTAS) if kind.startswith(prefix)), "")
     return prefix, kind.removeprefix(prefix)
 
 
 def check_space(name: str) -> None:
-    """Raise an :class:`UnknownNameError` unless a name is that of an absolute space."""
-    if split_name(name)[0] not in SPACES:
-        raise UnknownNameError("action space", name, SPACES)
+    """Raise an :class:`UnknownNameError` unless a name is that of an absolute or chunk-relative space."""
+    if commands_of(split_name(name)[0]) not in SPACES:
+        raise UnknownNameError("action space", name, [*SPACES, *CHUNK_RELATIVE])
 
 
 def name_of(space: ArmSpace, arm: Arm) -> str:
@@ -177,8 +180,8 @@ def arm_space_from_spec(spec: Mapping[str, Any], arm: Arm | None = None, *, post
             rotation = Quaternion(tuple(spec["hemisphere"]))
         prefix, absolute = _split_kind(split_name(kind)[0])
         space = _absolute(absolute, arm, rotation, posture, spec)
-        if prefix:
-            space = RELATIVE[prefix](arm, space, DeltaBounds(**spec["bounds"]))
+        if prefix in DELTAS:
+            space = DELTAS[prefix](arm, space, DeltaBounds(**spec["bounds"]))
         expected = {key: described[key] for key in ("joints", "base_frame", "ee_frame", "redundant", "fingerprint")}
     except KeyError as error:
         raise SpecError(f"Action spec has no {error}.") from error

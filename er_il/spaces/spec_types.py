@@ -67,6 +67,7 @@ class _Spec(_Space):
     """Of one arm, or of a layout with several."""
 
     joint_names: Names = []
+    chunk: Annotated[StrictInt, Field(ge=1)] = 1
     arms: Annotated[list[_Space], Field(min_length=1)] = [_Space()]
 
 

@@ -46,7 +46,7 @@ class DecodingRobotConfig(RobotConfig):
         units: Units of that arm's joints: ``deg``, as LeRobot's robots, or ``rad``.
         arms: YAML file of its arms, as ``er-il encode --arms`` reads it, in place of ``arm`` and ``units``.
         action_space: ``task``, ``erj``, ``era`` or ``joint``.
-        rotation: ``quat`` or ``rot6d``.
+        rotation: ``quat``, ``rot6d`` or ``rot6d_rows``.
         fps: Rate of control [Hz], for which commands keep the arm's velocity limits; the dataset's if 0.
         on_invalid: The answer to an invalid action: ``best_effort``, ``hold``, ``stop``.
     """

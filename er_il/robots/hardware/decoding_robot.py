@@ -117,7 +117,7 @@ class DecodingRobot(Robot):
             ErIlError: it lacks a dimension, or the measured joints are not finite.
         """
         values = {bare(name): float(value) for name, value in action.items()}
-        if self._layout.kind != JOINT and all(bare(name) in values for name in self._layout.names):
+        if self._layout.commands != JOINT and all(bare(name) in values for name in self._layout.names):
             names = (name for name in self._inner.action_features if bare(name) in values)
             return self._inner.send_action({name: values[bare(name)] for name in names})
         if missing := [name for name in self._layout.encoded_names if bare(name) not in values]:
