@@ -73,8 +73,8 @@ def elbow_spread(arm: Arm, paths: Sequence[Array]) -> ElbowSpread:
     states = [np.concatenate([T[:, :3, 3], LENGTH / np.sqrt(2.0) * T[:, :3, :3].reshape(-1, 9)], axis=1) for T in poses]
     trees = [KDTree(each) for each in states]
     episodes = np.repeat(np.arange(len(paths)), [len(path) for path in paths])
-    shares = np.concatenate([np.linspace(0.0, 1.0, len(path)) for path in paths])
-    starts = np.cumsum([0, *map(len, paths)])
+    shares = np.concatenate([np.linspace(0.0, 1.0, len(path)) for path in paths]).astype(np.float64)
+    starts: list[int] = np.cumsum([0, *map(len, paths)]).tolist()
     q, every = np.concatenate(paths), np.concatenate(states)
     chosen = np.unique(np.linspace(0, len(q) - 1, FRAMES).astype(int))
     first, second = [], []

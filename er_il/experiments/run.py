@@ -67,7 +67,7 @@ class Experiment(Protocol):
         ...
 
     def results(self) -> "tuple[dict[str, Any], pd.DataFrame, Sequence[str]]":
-        """The report of the complete cells, their rollouts in long form, and which columns are published; all if empty."""
+        """The report of the complete cells, their rollouts in long form, and which columns to publish; all if empty."""
         ...
 
     def films(self, all_of_them: bool) -> Mapping[str, Sequence[Job]]:

@@ -67,7 +67,7 @@ def study_audit(arm: Arm, paths: Sequence[JointPath], fps: float, workers: int, 
 
 
 def _spread(spread: ElbowSpread, episodes: int) -> dict[str, Any]:
-    edges = np.linspace(0.0, 1.0, BINS + 1)
+    edges = np.linspace(0.0, 1.0, BINS + 1).astype(np.float64)
     return {
         "frames": spread.frames,
         "covered": spread.covered,
