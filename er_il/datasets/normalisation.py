@@ -18,6 +18,7 @@ Stats = dict[str, dict[str, np.ndarray]]
 
 MARGIN = 0.025  # [m], or of a quaternion's component (2.9 degrees), around where objects start
 LEAST_DEVIATION = 0.02  # [rad], [m], or of a quaternion's component, of the robot's state
+HIDING = 1e6  # [rad]
 LEAST_ROTATION = 0.05  # of a component of an action's rotation (a quaternion's: 5.7 degrees)
 
 
@@ -41,6 +42,22 @@ def normalise_observations(root: Path) -> None:
     starts = poses[[rows.start for rows in dataset.episodes.values()]].astype(np.float64)
     stats[ENVIRONMENT_STATE] |= {"min": starts.min(axis=0) - MARGIN, "max": starts.max(axis=0) + MARGIN}
     stats[STATE] |= {"std": np.maximum(stats[STATE]["std"], LEAST_DEVIATION)}
+    _write(stats, root)
+
+
+def hide_joints(root: Path) -> None:
+    """Set the statistics such that policies of ``configs/`` do not see the arm's joints, but the hand as ever.
+
+    A joint angle is scaled by a deviation in which it is next to nothing.
+
+    Args:
+        root: Folder of the dataset; its episodes' own statistics stay what they were.
+    """
+    stats = load_stats(root) or {}
+    dataset = Dataset(root)
+    joints = {name for part in dataset.layout.parts for name in part.motors.state or part.motors.joints}
+    hidden = np.array([name in joints for name in dataset.names(STATE)])
+    stats[STATE] |= {"std": np.where(hidden, HIDING, stats[STATE]["std"])}
     _write(stats, root)
 
 

@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -20,7 +21,7 @@ from er_il.experiments.schedule import Job, notes
 from er_il.kinematics.rotation import Quaternion
 from er_il.policy.configuration import default_config
 from er_il.policy.training import PRECISION, Training, train_episodes
-from er_il.support.atomic_files import write_json
+from er_il.support.atomic_files import atomic_folder, write_json
 from er_il.support.cost import measured
 from er_il.support.errors import ErIlError
 
@@ -94,13 +95,39 @@ class FitWeights(Job):
 
 
 @dataclass(frozen=True)
+class HideJoints(Job):
+    """Make a dataset of a space whose policies do not see the arm's joints."""
+
+    needs: tuple[Demonstrate]
+    space: str
+
+    stage = "Hide joints"
+
+    @property
+    def recipe(self) -> Recipe:
+        """Recipe of the demonstrations."""
+        return self.needs[0].recipe
+
+    def dataset(self, space: str) -> Path:
+        """The dataset, which is of one space only."""
+        return self.path
+
+    def run(self) -> None:
+        from er_il.datasets.normalisation import hide_joints
+
+        with atomic_folder(self.path) as partial:
+            shutil.copytree(self.needs[0].dataset(self.space), partial)
+            hide_joints(partial)
+
+
+@dataclass(frozen=True)
 class Train(Job):
     """Train the policy of a space, ``size`` steps, with LeRobot's own command, or go on where that was interrupted.
 
     The result is notes (JSON) on the policy's cost and origin; the training is in the folder of that name beside.
     """
 
-    needs: tuple[Demonstrate | FitWeights]
+    needs: tuple[Demonstrate | FitWeights | HideJoints]
     space: str
     seed: int
     demonstrations: int  # the first ones of the training episodes

@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from er_il.datasets.record import DatasetRecord
-from er_il.evaluation.posture_baselines import space_of
+from er_il.evaluation.posture_baselines import UNSEEN_ELBOW, space_of
 from er_il.evaluation.rollout import FIRST_SEED
 from er_il.experiments.grid import Cell, Grid
-from er_il.experiments.jobs import Demonstrate, FitWeights, RollOut, Train
+from er_il.experiments.jobs import Demonstrate, FitWeights, HideJoints, RollOut, Train
 from er_il.experiments.owner import OWNER, claimed, owner_of
 from er_il.policy.configuration import default_config, default_steps, read_config
 from er_il.policy.rows import POLICY_ROWS
@@ -83,10 +83,13 @@ class Plan:
             jobs[task] = Demonstrate(folder / task, name, (), recipe.episodes, recipe, spaces, self.recorders)
         return jobs
 
-    def _source(self, cell: Cell) -> Demonstrate | FitWeights:
+    def _source(self, cell: Cell) -> Demonstrate | FitWeights | HideJoints:
         """What makes the dataset of a cell's policy."""
         demonstrated, count = self._demonstrations[cell.task], cell.demonstrations
         space = space_of(cell.decoder)
+        if cell.decoder in UNSEEN_ELBOW:
+            path = self.out / "unseen" / cell.task / space
+            return HideJoints(path, f"hide the joints of {cell.task} {space}", (demonstrated,), 1, space)
         if commands_of(space) != ERX:
             return demonstrated
         path = self.out / "fitted" / cell.task / f"{space}-{count}-demonstrations"
@@ -100,9 +103,11 @@ class Plan:
         configuration = self.grid.configuration
         steps = self.grid.steps or default_steps(default_config(space, configuration))
         variant = f"{count}-demonstrations-{steps}-steps-seed-{seed}"
+        if unseen := cell.decoder in UNSEEN_ELBOW:
+            variant += "-joints-unseen"
         return Train(
             self.out / "policies" / task / space / f"{variant}.json",
-            f"train {task} {space} on {count} demonstrations, seed {seed}",
+            f"train {task} {space} on {count} demonstrations, seed {seed}{', joints unseen' * unseen}",
             (self._source(cell),),
             size=steps,
             space=space,
