@@ -180,10 +180,9 @@ def test_an_agents_rollouts_become_datasets_and_these_policies(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     shutil.copytree(homing, "policies/reach_target/rl_task")
-    page = "docs/reinforcement_learning.md"
-    documented_run("er-il", *documented(page, "er-il generate"), "--episodes", "2")
+    documented_run("er-il", *documented("docs/reinforcement_learning.md", "er-il generate"), "--episodes", "2")
     train_in_process(monkeypatch, "--batch_size=2")
-    documented_run("er-il", *documented(page, "er-il train"), "--steps", "2")
+    documented_run("er-il", *documented("docs/reinforcement_learning.md", "er-il train"), "--steps", "2")
     out = tmp_path / "datasets/by_agent"
     dataset = Dataset(out / "erj")
     assert (dataset.info["fps"], dataset.info["total_episodes"]) == (10, 2)

@@ -133,7 +133,7 @@ def test_every_command_is_run_or_the_page_says_why_not(page: str, monkeypatch: p
         name, *words = span.split()
         options = {word.split("=")[0] for word in words if word.startswith("--")}
         if name == "er-il" and words and words[0] != "COMMAND":
-            assert options <= options_of(words[0]) | {"--help"}, span
+            assert options <= options_of(*subcommand(words)) | {"--help"}, span
         else:
             assert entry_point(name), span
             assert name == "er-il" or not options, f"{span}: show it in a block, where it is run"
@@ -150,10 +150,13 @@ def test_options_that_a_page_names_exist(page: str):
         for program, *words in block.commands:
             given = {word.split("=")[0] for word in words if re.match(r"--[a-z]", word)}
             if program == "er-il" and words and not words[0].startswith("-"):
-                assert given <= options_of(words[0]) | {"--help"}, shlex.join(words)
+                assert given <= options_of(*subcommand(words)) | {"--help"}, shlex.join(words)
             else:
                 others |= given
-    ours = set().union(*map(options_of, er_il.cli.COMMANDS))
+    every = [name for name in er_il.cli.COMMANDS if name not in GROUPS] + [
+        f"{group} {name}" for group, names in GROUPS.items() for name in names
+    ]
+    ours = set().union(*(options_of(*name.split()) for name in every))
     spans = [span for span in re.findall(r"`([^`\n]+)`", prose(page)) if span.startswith("--")]
     for span in spans:
         for option in re.findall(r"(?<![\w-])--[a-z][\w-]*(?![\w.-])", span):
@@ -181,12 +184,22 @@ def is_run_by(file: str, command: list[str], page: str) -> bool:
 
 
 @functools.lru_cache
-def options_of(command: str) -> set[str]:
+# Commands that have commands of their own.
+GROUPS = {"rl": ("train", "eval"), "study": ("validity", "joints", "deltas", "margins", "elbow_angle")}
+
+
+def subcommand(words: list[str]) -> list[str]:
+    """The command in what is behind er-il."""
+    return words[: 2 if words[0] in GROUPS else 1]
+
+
+@functools.lru_cache
+def options_of(*command: str) -> set[str]:
     """The options of one of er-il's commands, by its help."""
     shown = io.StringIO()
     with contextlib.redirect_stdout(shown):
-        run("er-il", command, "--help")
-    return set(re.findall(r"--[a-z-]+", shown.getvalue()))
+        run("er-il", *command, "--help")
+    return set(re.findall(r"--[a-z][a-z-]*", shown.getvalue()))
 
 
 class ParsedError(Exception):

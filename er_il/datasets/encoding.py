@@ -103,7 +103,8 @@ def decode_dataset(
             feature, restored = found
             actions = Column(feature, actions.values)
         rewrite(source, partial, {ACTION: actions}, restored.copies, restored.dropped)
-        normalise_actions(partial)
+        if not found:  # joints as they were recorded have LeRobot's own statistics
+            normalise_actions(partial)
         finish(partial)
     return decoded
 

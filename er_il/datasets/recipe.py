@@ -78,6 +78,12 @@ class Recipe(Declaration):
         recipe = cls.from_file(path)
         return recipe if arm is None else recipe.replaced(arm=arm)
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON or YAML, those of a leader at the usual rate without either: as before."""
+        values = super().to_dict()
+        usual = {name: field.default for name, field in type(self).model_fields.items() if name in ("rate", "agent")}
+        return {name: value for name, value in values.items() if name not in usual or value != usual[name]}
+
     def resized(self, episodes: int) -> "Recipe":
         """Return the recipe for another number of episodes, the same share of them held out (rounded up)."""
         share = -(-episodes * self.validation // self.episodes)
@@ -85,7 +91,7 @@ class Recipe(Declaration):
 
     def differences(self, other: "Recipe") -> str:
         """Name what differs from another recipe, as ``key: ours instead of theirs``; "" if nothing does."""
-        ours, theirs = self.to_dict(), other.to_dict()
+        ours, theirs = (each.model_dump(mode="json") for each in (self, other))
         return ", ".join(f"{key} {ours[key]} instead of {theirs[key]}" for key in ours if ours[key] != theirs[key])
 
     @property

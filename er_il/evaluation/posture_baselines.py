@@ -35,8 +35,8 @@ POSTURE_BASELINES: Mapping[str, Callable[[Sequence[Array]], Array]] = {
     "task-grasp": grasp_posture,
 }
 
-# Decoders that bring the elbow where no demonstration had it. Their policies are trained not to see the joints: those that
-# do observe what they were never shown, and are lost even on a task on which any elbow will do.
+# Decoders that bring the elbow where no demonstration had it. Their policies are trained not to see the joints: others
+# observe what they were never shown, and are lost even on a task on which any elbow will do.
 UNSEEN_ELBOW = ("task-clear",)
 
 POSTURE_DECODER = "task-posture"  # what a posture baseline is, but for the posture
