@@ -183,7 +183,6 @@ def is_run_by(file: str, command: list[str], page: str) -> bool:
     return any(where == page and shlex.join(command).startswith(start) for where, start in taken)
 
 
-@functools.lru_cache
 # Commands that have commands of their own.
 GROUPS = {"rl": ("train", "eval"), "study": ("validity", "joints", "deltas", "margins", "elbow_angle")}
 
