@@ -82,7 +82,7 @@ def elbow_spread(arm: Arm, paths: Sequence[Array]) -> ElbowSpread:
         rows = chosen[episodes[chosen] != other]
         distance, nearest = tree.query(every[rows])
         first.append(rows[distance <= NEAR])
-        second.append(starts[other] + nearest[distance <= NEAR])
+        second.append(starts[other] + np.asarray(nearest)[distance <= NEAR])
     one, two = np.concatenate(first), np.concatenate(second)
     N = self_motions(arm, q[one])
     along = np.einsum("pmn,pn->pm", N, q[two] - q[one])
