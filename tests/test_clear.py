@@ -1,14 +1,19 @@
 """The decoder ``task-clear``: the pose is kept, the elbow keeps clear of the world."""
 
+import shutil
 from itertools import islice
 from pathlib import Path
 
 import gymnasium
 import numpy as np
 import pytest
+from lerobot.datasets.io_utils import load_stats
 from numpy.typing import NDArray
 
 from er_il.arms.arm import Arm
+from er_il.datasets.dataset import Dataset
+from er_il.datasets.normalisation import hide_joints
+from er_il.datasets.schema import STATE
 from er_il.envs import lerobot_plugin
 from er_il.envs.decoders import DECODERS, Decoder
 from er_il.envs.lerobot_plugin import ErIlEnvConfig
@@ -16,6 +21,7 @@ from er_il.envs.side_by_side import BatchDecodingEnv
 from er_il.envs.tasks import task_id
 from er_il.envs.wrapper import ActionSpaceEnv, make_action_space_env
 from er_il.experiments.grid import Cell, Grid
+from er_il.experiments.jobs import HideJoints
 from er_il.experiments.plan import Plan
 from er_il.kinematics.self_motion import tangents, walk
 from er_il.kinematics.solver import Status, kinematics_of
@@ -163,9 +169,18 @@ def test_where_it_cannot_work_it_says_so(monkeypatch: pytest.MonkeyPatch) -> Non
     assert DECODERS["task-nearest"].works_in(world) and not DECODERS["task-clear"].works_in(world)
 
 
-def test_the_table_rolls_the_policies_of_task_space_out_through_it(tmp_path: Path) -> None:
-    grid = Grid.from_file(data_dir("configs") / "table1.yaml")
-    assert "task-clear" in grid.decoders
-    plan = Plan(grid, tmp_path)
-    clear, nearest = (plan.training(Cell("reach_cup", name, 32), 0).path for name in ("task-clear", "task-nearest"))
-    assert clear == nearest
+def test_its_policies_in_the_table_are_of_task_space_and_do_not_see_the_joints(reach_cup: Path, tmp_path: Path) -> None:
+    plan = Plan(Grid.from_file(data_dir("configs") / "table1.yaml"), tmp_path)
+    clear, nearest = (plan.training(Cell("reach_cup", name, 32), 0) for name in ("task-clear", "task-nearest"))
+    (hiding,) = clear.needs
+    assert isinstance(hiding, HideJoints) and clear.space == nearest.space == "task"
+    assert clear.path != nearest.path and hiding.needs == nearest.needs
+    shutil.copytree(reach_cup / "erj", tmp_path / "erj")
+    before = load_stats(tmp_path / "erj")
+    hide_joints(tmp_path / "erj")
+    after, dataset = load_stats(tmp_path / "erj"), Dataset(tmp_path / "erj")
+    assert before is not None and after is not None
+    scaled = (dataset.vectors(STATE) - after[STATE]["mean"]) / after[STATE]["std"]
+    seen = [name for name, column in zip(dataset.names(STATE), scaled.T, strict=True) if np.abs(column).max() > 1e-3]
+    assert seen == ["gripper", "ee.x", "ee.y", "ee.z", "ee.qx", "ee.qy", "ee.qz", "ee.qw"]
+    assert np.array_equal(after[STATE]["std"][7:], before[STATE]["std"][7:])
