@@ -4,11 +4,13 @@ import gymnasium
 import numpy as np
 import pytest
 
+from er_il.envs import make_rl_env
 from sim_tasks.tasks.carry_task import ARRIVED, MARK, GraspTask
 from sim_tasks.tasks.pick_and_lift import LEAST, PickAndLift
 from sim_tasks.tasks.pick_up_cup import LEFT
 from sim_tasks.tasks.take_lid_off_saucepan import LIFT, SAUCEPAN, TakeLidOffSaucepan
 from sim_tasks.world.blocks import BLOCK
+from sim_tasks.world.contact import touching
 from sim_tasks.world.robot import FINGER_TRAVEL
 from sim_tasks.world.saucepan import KNOB_RADIUS
 from sim_tasks.world.tableware import CUP_RADIUS
@@ -112,3 +114,23 @@ def test_blocks_leave_room_for_the_fingers_and_the_mark_is_above_the_bench() -> 
         assert min(gaps) > LEAST
         heights.append(world.position(MARK)[2])
     assert 0.15 <= min(heights) < 0.2 and 0.3 < max(heights) <= 0.35
+
+
+@pytest.mark.parametrize(("offset", "taken"), [((0.0, 0.0, 0.032), True), ((-0.05, 0.0, 0.0), False)])
+def test_the_lid_is_taken_by_its_knob(offset: tuple[float, float, float], taken: bool) -> None:
+    env = make_rl_env("take_lid_off_saucepan", "task")
+    env.reset(seed=0)
+    world = env.world
+    assert isinstance(world, TakeLidOffSaucepan)
+    target = world.position("lid") + offset
+    for opening in (1.0, -1.0):
+        for _ in range(20):
+            away = target - world.tip
+            action = np.array([*np.clip(away / 0.05, -1, 1), 0, 0, 0, opening], np.float32)
+            env.step(action)
+        if opening > 0:
+            assert np.linalg.norm(away[:2]) < 0.01
+    lid = {world.model.body("lid").id}
+    assert all(touching(world.model, world.data, finger, lid) for finger in world._fingers)  # of the rim, too
+    assert world.grasped == taken
+    env.close()

@@ -5,7 +5,8 @@ from collections.abc import Collection, Sequence
 import mujoco
 import numpy as np
 
-from sim_tasks.world.contact import touching
+from sim_tasks.world.contact import touches_shape, touching
+from sim_tasks.world.household import grip_name
 from sim_tasks.world.robot import HAND
 
 CLOSED = 0.5  # opening below which the fingers are told to close
@@ -27,10 +28,12 @@ class Attachment:
     """Attaches one body at a time to the hand of a compiled world, which :func:`add_attachments` prepared."""
 
     def __init__(self, model: mujoco.MjModel, bodies: Sequence[str], fingers: Sequence[Collection[int]]) -> None:
-        """Attach ``bodies`` when all of the groups of bodies ``fingers`` touch them."""
+        """Attach ``bodies`` when all of the groups of bodies ``fingers`` touch them, at their grip if they have one."""
         self._model = model
         self._fingers = fingers
         self._bodies = {name: (model.body(name).id, model.equality(_weld(name)).id) for name in bodies}
+        grips = {name: mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, grip_name(name)) for name in bodies}
+        self._grips = {name: geom for name, geom in grips.items() if geom >= 0}
         self._hand = model.body(HAND).id
         self.held = ""  # the body that is attached
 
@@ -43,10 +46,15 @@ class Attachment:
         if opening >= CLOSED:
             self._release(data)
         elif not self.held:
-            for name, (body, _) in self._bodies.items():
-                if all(touching(self._model, data, finger, {body}) for finger in self._fingers):
+            for name in self._bodies:
+                if all(self._touches(data, finger, name) for finger in self._fingers):
                     self._attach(data, name)
                     return
+
+    def _touches(self, data: mujoco.MjData, finger: Collection[int], name: str) -> bool:
+        if name in self._grips:
+            return touches_shape(self._model, data, finger, self._grips[name])
+        return touching(self._model, data, finger, {self._bodies[name][0]})
 
     def _attach(self, data: mujoco.MjData, name: str) -> None:
         body, weld = self._bodies[name]

@@ -14,6 +14,13 @@ def touching(model: mujoco.MjModel, data: mujoco.MjData, one: Collection[int], o
     return next(_between(model, data, one, other), None) is not None
 
 
+def touches_shape(model: mujoco.MjModel, data: mujoco.MjData, bodies: Collection[int], geom: int) -> bool:
+    """True if any body of a group touches a shape."""
+    pairs = data.contact.geom
+    others = np.concatenate([pairs[pairs[:, 0] == geom, 1], pairs[pairs[:, 1] == geom, 0]])
+    return bool(np.isin(model.geom_bodyid[others], list(bodies)).any())
+
+
 def contact_force(model: mujoco.MjModel, data: mujoco.MjData, one: Collection[int], other: Collection[int]) -> float:
     """Sum of the contact forces' magnitudes [N] between two groups of bodies."""
     total, force = 0.0, np.zeros(6)

@@ -43,6 +43,7 @@ class Thing:
     mass: float  # [kg]
     looks: tuple[Primitive, ...]  # visual only
     touch: tuple[tuple[Primitive, float], ...]  # collision only, each with its share of the mass
+    grip: Primitive | None = None  # the one of these that a hand is to take it by; any if None
 
     def add(self, spec: mujoco.MjSpec, name: str, position: Sequence[float]) -> mujoco.MjsBody:
         """Add the thing with a free joint of its name."""
@@ -51,8 +52,15 @@ class Thing:
         for primitive in self.looks:
             _geom(body, primitive, mass=0, contype=0, conaffinity=0, group=2)
         for primitive, share in self.touch:
-            _geom(body, primitive, mass=share * self.mass, friction=(1.0, 0.02, 0.0005), condim=4, group=3)
+            name_of = {"name": grip_name(name)} if primitive is self.grip else {}
+            solid = {"mass": share * self.mass, "friction": (1.0, 0.02, 0.0005), "condim": 4, "group": 3}
+            _geom(body, primitive, **solid, **name_of)
         return body
+
+
+def grip_name(name: str) -> str:
+    """Name of the collision shape that a thing is to be taken by."""
+    return f"{name}_grip"
 
 
 def _geom(body: mujoco.MjsBody, primitive: Primitive, **kwargs: object) -> None:

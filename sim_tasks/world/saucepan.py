@@ -43,6 +43,7 @@ class Saucepan:
                 (Primitive(CYLINDER, (radius, half, 0.0), (0.0, 0.0, half)), 0.9),
                 (knob, 0.1),
             ),
+            grip=knob,
         )
 
     def add(self, spec: mujoco.MjSpec, name: str) -> mujoco.MjsBody:
