@@ -116,7 +116,7 @@ def test_blocks_leave_room_for_the_fingers_and_the_mark_is_above_the_bench() -> 
     assert 0.15 <= min(heights) < 0.2 and 0.3 < max(heights) <= 0.35
 
 
-@pytest.mark.parametrize(("offset", "taken"), [((0.0, 0.0, 0.032), True), ((-0.05, 0.0, 0.0), False)])
+@pytest.mark.parametrize(("offset", "taken"), [((0.0, 0.0, 0.032), True), ((-0.085, 0.0, 0.0), False)])
 def test_the_lid_is_taken_by_its_knob(offset: tuple[float, float, float], taken: bool) -> None:
     env = make_rl_env("take_lid_off_saucepan", "task")
     env.reset(seed=0)
