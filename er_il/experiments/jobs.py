@@ -17,6 +17,7 @@ from er_il.datasets.record import read_episodes
 from er_il.datasets.recording import generate
 from er_il.evaluation.elbow import ElbowReference
 from er_il.evaluation.posture_baselines import POSTURE_BASELINES, POSTURE_DECODER
+from er_il.experiments.cell_plan import RolloutJob, TrainingJob
 from er_il.experiments.schedule import Job, notes
 from er_il.kinematics.rotation import Quaternion
 from er_il.policy.configuration import default_config
@@ -121,7 +122,7 @@ class HideJoints(Job):
 
 
 @dataclass(frozen=True)
-class Train(Job):
+class Train(TrainingJob):
     """Train the policy of a space, ``size`` steps, with LeRobot's own command, or go on where that was interrupted.
 
     The result is notes (JSON) on the policy's cost and origin; the training is in the folder of that name beside.
@@ -129,7 +130,6 @@ class Train(Job):
 
     needs: tuple[Demonstrate | FitWeights | HideJoints]
     space: str
-    seed: int
     demonstrations: int  # the first ones of the training episodes
     configuration: str  # kind of the shipped one, such as images_small; from states if empty
 
@@ -161,7 +161,7 @@ class Train(Job):
 
 
 @dataclass(frozen=True)
-class RollOut(Job):
+class RollOut(RolloutJob):
     """Roll a trained policy out through a decoder, on ``size`` initial states."""
 
     needs: tuple[Train]

@@ -4,19 +4,17 @@ So a grid may grow by tasks, decoders, seeds or demonstrations without anything 
 """
 
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import chain
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from er_il.datasets.record import DatasetRecord
 from er_il.evaluation.posture_baselines import UNSEEN_ELBOW, space_of
 from er_il.evaluation.rollout import FIRST_SEED
+from er_il.experiments.cell_plan import CellPlan
 from er_il.experiments.grid import Cell, Grid
 from er_il.experiments.jobs import Demonstrate, FitWeights, HideJoints, RollOut, Train
-from er_il.experiments.owner import OWNER, claimed, owner_of
+from er_il.experiments.owner import OWNER, owner_of
 from er_il.policy.configuration import default_config, default_steps, read_config
 from er_il.policy.rows import POLICY_ROWS
 from er_il.spaces.chunk import commands_of
@@ -24,27 +22,12 @@ from er_il.spaces.joint import JOINT
 from er_il.spaces.registry import ERX
 from er_il.support.errors import ErIlError
 
-if TYPE_CHECKING:
-    import pandas as pd
-
 
 @dataclass(frozen=True)
-class Plan:
-    """A grid's jobs, with their results in a folder. Other grids may share it: what is common is done once."""
+class Plan(CellPlan[Grid, Cell, RollOut]):
+    """The jobs of policies that imitate demonstrations."""
 
-    grid: Grid
-    out: Path
     recorders: int = 1  # processes that record a task's demonstrations
-
-    @contextmanager
-    def claimed(self) -> Iterator[None]:
-        """Make the folder one of experiments, and work in it alone.
-
-        Raises:
-            ErIlError: another command works in it, or :meth:`check` refuses it.
-        """
-        with claimed(self.out, self.check):
-            yield
 
     def check(self) -> dict[str, Any]:
         """Check that this grid can work in the folder; return what the folder is to say of its policies.
@@ -116,7 +99,8 @@ class Plan:
             configuration=configuration,
         )
 
-    def _rolling_out(self, cell: Cell) -> Iterator[RollOut]:
+    def rollouts_of(self, cell: Cell) -> Iterator[RollOut]:
+        """The rollouts of a cell, training seed by training seed."""
         end = FIRST_SEED + self.grid.rollouts
         for trained in (self.training(cell, seed) for seed in self.grid.seeds_of(cell)):
             width = "" if cell.within is None else f"-within-{cell.within:g}"
@@ -127,28 +111,3 @@ class Plan:
                 name = f"roll out {cell.decoder} from {first} to {last}{width.replace('-', ' ')} ({trained.name})"
                 path = folder / f"{first}-{last}.json"
                 yield RollOut(path, name, (trained,), count, cell.decoder, first, cell.within)
-
-    @cached_property
-    def targets(self) -> dict[Cell, list[RollOut]]:
-        """The rollouts of each cell, training seed by training seed."""
-        return {cell: list(self._rolling_out(cell)) for cell in self.grid.cells}
-
-    @property
-    def jobs(self) -> list[RollOut]:
-        """All rollouts, the first training seed of every cell first: an early look at the whole table."""
-        return sorted(chain(*self.targets.values()), key=lambda job: self.grid.training_seeds.index(job.needs[0].seed))
-
-    @property
-    def complete(self) -> list[Cell]:
-        """The cells whose rollouts are all done."""
-        return [cell for cell, jobs in self.targets.items() if all(job.done for job in jobs)]
-
-    def rollouts(self, *cells: Cell) -> "pd.DataFrame":
-        """The rollouts of complete cells in long form (:func:`er_il.evaluation.results.long_form`)."""
-        from er_il.evaluation.results import load_rollouts, long_form  # pandas: a second that mistakes do without
-
-        return long_form(
-            (cell.labels | {"training_seed": job.needs[0].seed}, load_rollouts(job.path))
-            for cell in cells
-            for job in self.targets[cell]
-        )

@@ -2,7 +2,6 @@
 
 import gzip
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from rich.progress import Progress
 
 from er_il.evaluation.results import EPISODES, RESULTS, as_csv
+from er_il.experiments.cell_plan import CellPlan
 from er_il.experiments.schedule import Executor, Job, Schedule
 from er_il.support.atomic_files import write_atomically, write_json
 from er_il.support.provenance import provenance
@@ -32,34 +32,8 @@ class Experiment(Protocol):
     """What a kind of experiment consists of, and how it is shown."""
 
     @property
-    def out(self) -> Path:
-        """Folder of everything that it makes."""
-        ...
-
-    @property
-    def jobs(self) -> Sequence[Job]:
-        """All that its results need, in the order in which they start as far as needs and workers allow."""
-        ...
-
-    @property
-    def targets(self) -> Mapping[Any, Sequence[Job]]:
-        """The jobs of each cell."""
-        ...
-
-    def check(self) -> object:
-        """Check that it can work in its folder.
-
-        Raises:
-            ErIlError: the folder holds something else.
-        """
-        ...
-
-    def claimed(self) -> AbstractContextManager[None]:
-        """Work in its folder alone.
-
-        Raises:
-            ErIlError: another command works in it, or it holds something else.
-        """
+    def plan(self) -> CellPlan[Any, Any, Any]:
+        """All that its results need."""
         ...
 
     def summary(self, cell: Any) -> str:
@@ -99,8 +73,8 @@ def run(
     Raises:
         ErIlError: the experiment's folder belongs to something else, or another command works in it.
     """
-    with experiment.claimed():
-        schedule = Schedule(experiment.jobs)
+    with experiment.plan.claimed():
+        schedule = Schedule(experiment.plan.jobs)
         _run(schedule, executor, progress, _announcing(experiment, schedule, progress))
         report = write_results(experiment, folder)
         filming = experiment.films(with_films)
@@ -129,7 +103,7 @@ def _run(schedule: Schedule, executor: Executor, progress: Progress, watch: Call
 
 def _announcing(experiment: Experiment, schedule: Schedule, progress: Progress) -> Callable[[], None]:
     """A function that prints the successes of the cells that are complete since its last call, for logs too."""
-    total, waiting = len(experiment.targets), dict(experiment.targets)
+    total, waiting = len(experiment.plan.targets), dict(experiment.plan.targets)
 
     def announce() -> None:
         for cell in [cell for cell, jobs in waiting.items() if schedule.done.issuperset(jobs)]:

@@ -1,7 +1,6 @@
 """The experiment with agents: their trainings, assessments and curves."""
 
 from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,11 +9,11 @@ import numpy as np
 
 from er_il.evaluation.aggregate import interquartile_mean, stratified_interval
 from er_il.evaluation.recording import SUCCESS
-from er_il.evaluation.results import COUNTS, load_notes, report_cells
+from er_il.evaluation.results import COUNTS, report_cells
 from er_il.evaluation.rollout import FIRST_SEED
 from er_il.evaluation.trace import Trace
 from er_il.experiments.agents.grid import AgentCell
-from er_il.experiments.agents.jobs import AssessAgent, FilmAgent
+from er_il.experiments.agents.jobs import FilmAgent
 from er_il.experiments.agents.plan import AgentPlan
 from er_il.experiments.films import PICTURES, STRIP
 from er_il.report.agents_page import write_pages
@@ -34,24 +33,6 @@ class Learning:
     """An :class:`er_il.experiments.run.Experiment`."""
 
     plan: AgentPlan
-
-    @property
-    def out(self) -> Path:
-        return self.plan.out
-
-    @property
-    def jobs(self) -> Sequence[AssessAgent]:
-        return self.plan.jobs
-
-    @property
-    def targets(self) -> Mapping[AgentCell, Sequence[AssessAgent]]:
-        return self.plan.targets
-
-    def check(self) -> object:
-        return self.plan.check()
-
-    def claimed(self) -> AbstractContextManager[None]:
-        return self.plan.claimed()
 
     def summary(self, cell: AgentCell) -> str:
         success = self.plan.rollouts(cell).groupby("training_seed")["success"].sum()
@@ -91,25 +72,13 @@ class Learning:
         }
 
     def _meta(self) -> dict[str, Any]:
-        plan, complete = self.plan, self.plan.complete
-        done = [job for job in plan.jobs if job.done]
-        trained = {job.needs[0] for job in plan.jobs if job.needs[0].done}
-        learnt = [read_json(training.path, ErIlError) for training in trained]
-        assessed = [load_notes(job.path) for job in done]
+        plan = self.plan
         return {
             "title": plan.grid.title,
             "grid": plan.grid.to_dict(),
             "settings": plan.settings.to_dict(),
-            "computed_by": sorted({notes["git"] for notes in (*learnt, *assessed)}),
             "rollout_seeds": f"{FIRST_SEED} to {FIRST_SEED + plan.grid.episodes - 1}",
-            "costs": {
-                "trainings": len(learnt),
-                "training_cpu_s": round(sum(notes["cost"]["cpu"] for notes in learnt)),
-                "rollouts": sum(job.size for job in done),
-                "rollout_cpu_s": round(sum(notes["cost"]["cpu"] for notes in assessed)),
-            },
-            "missing": [{"task": cell.task, "decoder": cell.name} for cell in plan.grid.cells if cell not in complete],
-        }
+        } | plan.account(plan.trained())
 
 
 def _suite(cells: Sequence[Mapping[str, Any]], tasks: Sequence[str]) -> list[dict[str, Any]]:

@@ -29,6 +29,11 @@ class AgentCell:
         """The mode with its variant."""
         return f"{self.mode} ({self.variant})" if self.variant else self.mode
 
+    @property
+    def labels(self) -> dict[str, Any]:
+        """What results call the cell."""
+        return {"task": self.task, "decoder": self.name}
+
 
 class AgentGrid(Declaration):
     """What an experiment with agents compares.

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from er_il.evaluation.rollout import FIRST_SEED
+from er_il.experiments.cell_plan import RolloutJob, TrainingJob
 from er_il.experiments.schedule import Job, notes
 from er_il.rl.milestones import read_milestones
 from er_il.rl.settings import Settings
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class TrainAgent(Job):
+class TrainAgent(TrainingJob):
     """Train an agent, ``size`` decisions, or go on where that was interrupted.
 
     The result is notes (JSON) on the way there; the training is in the folder of that name beside.
@@ -28,7 +29,6 @@ class TrainAgent(Job):
 
     task: str
     mode: str
-    seed: int
     arm: str
     environment: Mapping[str, Any] = field(hash=False)  # settings of the task
     settings: Settings = field(hash=False)
@@ -70,7 +70,7 @@ class TrainAgent(Job):
 
 
 @dataclass(frozen=True)
-class AssessAgent(Job):
+class AssessAgent(RolloutJob):
     """Roll a trained agent out without exploration, from ``size`` starts that are the same for all."""
 
     needs: tuple[TrainAgent]
