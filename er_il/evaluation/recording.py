@@ -3,6 +3,8 @@
 The trace of a robot with several arms is that of its first; the film shows all.
 """
 
+from collections import defaultdict
+from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -23,6 +25,42 @@ PICTURE = (640, 480)  # [px] width and height
 Picture = NDArray[np.uint8]  # (H, W, 3)
 
 
+class TraceRecorder:
+    """Gathers the rows of a trace while an episode runs."""
+
+    def __init__(self) -> None:
+        self._rows: defaultdict[str, list[Any]] = defaultdict(list)
+
+    def __len__(self) -> int:
+        return len(self._rows["q"])
+
+    def add(self, **values: Any) -> None:
+        """Add some of a row's values: what was measured before the action, the action, or what became of it."""
+        for key, value in values.items():
+            self._rows[key].append(value)
+
+    def trace(self, info: Mapping[str, Any], **known: Any) -> Trace:
+        """Return the trace.
+
+        Args:
+            info: What the environment said with the last observation.
+            known: The trace's other values, the same in all rows.
+        """
+        return Trace(
+            **known,
+            outcome=SUCCESS if info["is_success"] else info["failure"] or TIMEOUT,
+            q=self._array("q"),
+            gripper=self._array("gripper"),
+            action=self._array("action"),
+            command=self._array("command"),
+            status=tuple(self._rows["status"]),
+            environment_state=self._array("environment_state"),
+        )
+
+    def _array(self, key: str) -> NDArray[np.float64]:
+        return np.array(self._rows[key], dtype=np.float64)
+
+
 def record_rollout(
     policy: Path, task: str, decoder_name: str, seed: int, film_every: int = 0, within: float | None = None
 ) -> tuple[Trace, list[Picture]]:
@@ -38,7 +76,7 @@ def record_rollout(
     """
     config = environment_of(policy, task, decoder_name, within=within)
     config.visualization_width, config.visualization_height = PICTURE
-    rows: dict[str, list[Any]] = {key: [] for key in ("q", "gripper", "action", "command", "status", "state")}
+    recorder = TraceRecorder()
     pictures: list[Picture] = []
     with closing(config.make()) as env, one_thread():
         check_policy(policy, env.layout)
@@ -50,33 +88,31 @@ def record_rollout(
         actor.reset(seed)
         done = False
         while not done:
-            if film_every and len(rows["q"]) % film_every == 0:
+            if film_every and len(recorder) % film_every == 0:
                 pictures.append(world.render())
-            rows["q"].append(world.joint_positions[: part.space.arm.dof])
-            rows["gripper"].append(openings()[0])
-            rows["state"].append(observation["environment_state"])
+            recorder.add(
+                q=world.joint_positions[: part.space.arm.dof],
+                gripper=openings()[0],
+                environment_state=observation["environment_state"],
+            )
             action = actor.act(_batched(observation), world.task_description)[0]
             observation, _, terminated, truncated, info = env.step(action)
             actions, grippers = layout.split_encoded(action)
-            rows["action"].append(np.append(actions[0], grippers[0]))
-            rows["command"].append(info["command"][: part.space.arm.dof])
-            rows["status"].append(info["decode_status"])
+            recorder.add(
+                action=np.append(actions[0], grippers[0]),
+                command=info["command"][: part.space.arm.dof],
+                status=info["decode_status"],
+            )
             done = terminated or truncated
         if film_every:
             pictures.append(world.render())
-        trace = Trace(
+        trace = recorder.trace(
+            info,
             task=task,
             seed=seed,
             period=1 / env.metadata["render_fps"],
             label=decoder_name,
-            outcome=SUCCESS if info["is_success"] else info["failure"] or TIMEOUT,
             spec=ActionSpace(part.space).spec(),
-            q=np.array(rows["q"]),
-            gripper=np.array(rows["gripper"]),
-            action=np.array(rows["action"], dtype=np.float64),
-            command=np.array(rows["command"]),
-            status=tuple(rows["status"]),
-            environment_state=np.array(rows["state"], dtype=np.float64),
             environment_state_names=world.environment_state_names,
         )
     return trace, pictures

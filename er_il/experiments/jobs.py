@@ -55,18 +55,11 @@ class Demonstrate(Job):
 
 
 @dataclass(frozen=True)
-class FitWeights(Job):
-    """Fit ERX's weights to the demonstrations that a policy is trained on, and to these alone: a dataset in ERX, or in
-    its chunk-relative form.
-
-    The others are encoded by the same weights.
-    """
+class DeriveDataset(Job):
+    """Make a dataset of one space out of the demonstrations."""
 
     needs: tuple[Demonstrate]
     space: str
-    demonstrations: int  # the first ones of the training episodes
-
-    stage = "Fit"
 
     @property
     def recipe(self) -> Recipe:
@@ -76,6 +69,19 @@ class FitWeights(Job):
     def dataset(self, space: str) -> Path:
         """The dataset, which is of one space only."""
         return self.path
+
+
+@dataclass(frozen=True)
+class FitWeights(DeriveDataset):
+    """Fit ERX's weights to the demonstrations that a policy is trained on, and to these alone: a dataset in ERX, or in
+    its chunk-relative form.
+
+    The others are encoded by the same weights.
+    """
+
+    demonstrations: int  # the first ones of the training episodes
+
+    stage = "Fit"
 
     def run(self) -> None:
         from lerobot.utils.utils import SuppressProgressBars
@@ -96,22 +102,10 @@ class FitWeights(Job):
 
 
 @dataclass(frozen=True)
-class HideJoints(Job):
+class HideJoints(DeriveDataset):
     """Make a dataset of a space whose policies do not see the arm's joints."""
 
-    needs: tuple[Demonstrate]
-    space: str
-
     stage = "Hide joints"
-
-    @property
-    def recipe(self) -> Recipe:
-        """Recipe of the demonstrations."""
-        return self.needs[0].recipe
-
-    def dataset(self, space: str) -> Path:
-        """The dataset, which is of one space only."""
-        return self.path
 
     def run(self) -> None:
         from er_il.datasets.normalisation import hide_joints
@@ -128,7 +122,7 @@ class Train(TrainingJob):
     The result is notes (JSON) on the policy's cost and origin; the training is in the folder of that name beside.
     """
 
-    needs: tuple[Demonstrate | FitWeights | HideJoints]
+    needs: tuple[Demonstrate | DeriveDataset]
     space: str
     demonstrations: int  # the first ones of the training episodes
     configuration: str  # kind of the shipped one, such as images_small; from states if empty

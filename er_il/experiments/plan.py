@@ -13,7 +13,7 @@ from er_il.evaluation.posture_baselines import UNSEEN_ELBOW, space_of
 from er_il.evaluation.rollout import FIRST_SEED
 from er_il.experiments.cell_plan import CellPlan
 from er_il.experiments.grid import Cell, Grid
-from er_il.experiments.jobs import Demonstrate, FitWeights, HideJoints, RollOut, Train
+from er_il.experiments.jobs import Demonstrate, DeriveDataset, FitWeights, HideJoints, RollOut, Train
 from er_il.experiments.owner import OWNER, owner_of
 from er_il.policy.configuration import default_config, default_steps, read_config
 from er_il.policy.rows import POLICY_ROWS
@@ -66,7 +66,7 @@ class Plan(CellPlan[Grid, Cell, RollOut]):
             jobs[task] = Demonstrate(folder / task, name, (), recipe.episodes, recipe, spaces, self.recorders)
         return jobs
 
-    def _source(self, cell: Cell) -> Demonstrate | FitWeights | HideJoints:
+    def _source(self, cell: Cell) -> Demonstrate | DeriveDataset:
         """What makes the dataset of a cell's policy."""
         demonstrated, count = self._demonstrations[cell.task], cell.demonstrations
         space = space_of(cell.decoder)

@@ -5,17 +5,15 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from er_il.envs.learning import RATE, LearningEnv, make_rl_env
+from er_il.envs.learning import LearningEnv, make_rl_env
 from er_il.evaluation.results import COUNTS, as_csv, long_form, summarise
 from er_il.policy.actor import one_thread
-from er_il.report.films import write_film
 from er_il.rl.evaluation import roll_out
 from er_il.rl.modeling_agent import AgentPolicy
 from er_il.rl.modes import mode_of_environment
-from er_il.rl.recording import record_episode
+from er_il.rl.recording import film_episode
 from er_il.support.atomic_files import write_atomically, write_json
 from er_il.support.provenance import provenance
-from er_il.viewer.show import save_rollout
 
 
 def environment_of(agent: AgentPolicy, **settings: Any) -> LearningEnv:
@@ -67,9 +65,6 @@ def film(agent: AgentPolicy, seeds: Sequence[int], folder: Path) -> Iterator[Pat
         return
     with one_thread(), closing(environment_of(agent, render_mode="rgb_array")) as env:
         for seed in seeds:
-            trace, pictures = record_episode(agent.act, env, agent.config.task, agent.config.mode, seed)
             path = folder / f"episode_{seed}.mp4"
-            write_film(pictures, path, RATE)
-            save_rollout(trace, path.with_suffix(".rrd"))
-            trace.save(path.with_suffix(".npz"))
+            film_episode(agent.act, env, agent.config.task, agent.config.mode, seed, path)
             yield path

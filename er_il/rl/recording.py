@@ -1,15 +1,22 @@
 """One episode of an agent, recorded in full: a trace, and a film."""
 
-from typing import Any
-
-import numpy as np
+from pathlib import Path
 
 from er_il.envs.learning import RATE, LearningEnv
-from er_il.evaluation.recording import SUCCESS, Picture
-from er_il.evaluation.rollout import TIMEOUT
+from er_il.evaluation.recording import Picture, TraceRecorder
 from er_il.evaluation.trace import Trace
+from er_il.report.films import write_film
 from er_il.rl.evaluation import Act
 from er_il.spaces.action_space import ActionSpace
+from er_il.viewer.show import save_rollout
+
+
+def film_episode(act: Act, env: LearningEnv, task: str, label: str, seed: int, film: Path) -> None:
+    """Record as :func:`record_episode` does: a film (.mp4), a Rerun recording (.rrd) and a trace (.npz, last)."""
+    trace, pictures = record_episode(act, env, task, label, seed)
+    write_film(pictures, film, RATE)
+    save_rollout(trace, film.with_suffix(".rrd"))
+    trace.save(film.with_suffix(".npz"))
 
 
 def record_episode(act: Act, env: LearningEnv, task: str, label: str, seed: int) -> tuple[Trace, list[Picture]]:
@@ -22,35 +29,30 @@ def record_episode(act: Act, env: LearningEnv, task: str, label: str, seed: int)
         label: Who acts.
         seed: Of the start.
     """
-    rows: dict[str, list[Any]] = {key: [] for key in ("q", "gripper", "action", "command", "status", "state")}
+    recorder = TraceRecorder()
     pictures: list[Picture] = []
     observation, info = env.reset(seed=seed)
     done = False
     while not done:
         pictures.append(env.render())
         action = act(observation)
-        rows["q"].append(env.world.joint_positions)
-        rows["gripper"].append(env.world.gripper_opening)
-        rows["state"].append(env.seen["environment_state"])
-        rows["action"].append(env.change(action))
+        recorder.add(
+            q=env.world.joint_positions,
+            gripper=env.world.gripper_opening,
+            environment_state=env.seen["environment_state"],
+            action=env.change(action),
+        )
         observation, _, terminated, truncated, info = env.step(action)
-        rows["command"].append(info["command"])
-        rows["status"].append(info["decode_status"])
+        recorder.add(command=info["command"], status=info["decode_status"])
         done = terminated or truncated
     pictures.append(env.render())
-    trace = Trace(
+    trace = recorder.trace(
+        info,
         task=task,
         seed=seed,
         period=1 / RATE,
         label=label,
-        outcome=SUCCESS if info["is_success"] else info["failure"] or TIMEOUT,
         spec=ActionSpace(env.space).spec(),
-        q=np.array(rows["q"]),
-        gripper=np.array(rows["gripper"], dtype=np.float64),
-        action=np.array(rows["action"]),
-        command=np.array(rows["command"]),
-        status=tuple(rows["status"]),
-        environment_state=np.array(rows["state"], dtype=np.float64),
         environment_state_names=env.world.environment_state_names,
     )
     return trace, pictures

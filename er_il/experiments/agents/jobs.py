@@ -105,17 +105,11 @@ class FilmAgent(Job):
         return self.path.with_suffix(".mp4")
 
     def run(self) -> None:
-        from er_il.envs.learning import RATE
         from er_il.policy.actor import one_thread
-        from er_il.report.films import write_film
         from er_il.rl.loading import load_agent
-        from er_il.rl.recording import record_episode
-        from er_il.viewer.show import save_rollout
+        from er_il.rl.recording import film_episode
 
         training = self.needs[0].training
         agent = load_agent(training.out)
         with one_thread(), closing(training.make_env(render_mode="rgb_array")) as env:
-            trace, pictures = record_episode(agent.act, env, training.task, training.mode, self.seed)
-        write_film(pictures, self.film, RATE)
-        save_rollout(trace, self.path.with_suffix(".rrd"))
-        trace.save(self.path)
+            film_episode(agent.act, env, training.task, training.mode, self.seed, self.film)
