@@ -30,6 +30,7 @@ class Recipe(Declaration):
 
     noun = "recipe"
     error = DatasetError
+    later = ("rate", "agent")
 
     task: StrictStr
     episodes: Annotated[StrictInt, Field(ge=1, le=DEMOS_PER_SEED)]  # successful demos, with those for validation
@@ -77,12 +78,6 @@ class Recipe(Declaration):
             raise UnknownNameError("task", task, recipe_names())
         recipe = cls.from_file(path)
         return recipe if arm is None else recipe.replaced(arm=arm)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON or YAML, those of a leader at the usual rate without either: as before."""
-        values = super().to_dict()
-        usual = {name: field.default for name, field in type(self).model_fields.items() if name in ("rate", "agent")}
-        return {name: value for name, value in values.items() if name not in usual or value != usual[name]}
 
     def resized(self, episodes: int) -> "Recipe":
         """Return the recipe for another number of episodes, the same share of them held out (rounded up)."""

@@ -26,6 +26,14 @@ class GridError(ErIlError):
     """A grid file that is unreadable, or asks for something that cannot be."""
 
 
+def check_distinct(grid: Declaration, *keys: str) -> None:
+    """Refuse a grid that names a value of these keys twice."""
+    for key in keys:
+        values = getattr(grid, key)
+        if twice := sorted({str(value) for value in values if values.count(value) > 1}):
+            raise GridError(f"{key} names {', '.join(twice)} twice.")
+
+
 @dataclass(frozen=True)
 class Cell:
     """A task and a decoder, with policies trained on so many demonstrations, rolled out within so wide a square."""
@@ -51,6 +59,7 @@ class Grid(Declaration):
 
     noun = "grid"
     error = GridError
+    later = ("within",)
 
     title: StrictStr
     tasks: Annotated[Names, Field(min_length=1)]
@@ -80,10 +89,7 @@ class Grid(Declaration):
             if name in POSTURE_BASELINES:
                 raise GridError(f"{name} stands among the decoders; list it under posture_baselines.")
             space_of(name)  # raises if unknown
-        for key in ("tasks", "decoders", "training_seeds", "demonstrations", "posture_baselines", "within"):
-            values = getattr(self, key)
-            if twice := sorted({str(value) for value in values if values.count(value) > 1}):
-                raise GridError(f"{key} names {', '.join(twice)} twice.")
+        check_distinct(self, "tasks", "decoders", "training_seeds", "demonstrations", "posture_baselines", "within")
         self._check_images()
         self._check_widths()
         for task in self.tasks:  # raises if unknown
@@ -111,11 +117,6 @@ class Grid(Declaration):
         if unplaced := [task for task in self.tasks if not takes_option(task, WITHIN)]:
             known = ", ".join(task for task in task_names() if takes_option(task, WITHIN))
             raise GridError(f"within is for tasks that place a cup: {known}; not for {', '.join(unplaced)}.")
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON or YAML, without ``within`` where it is empty: as before there was that key."""
-        values = super().to_dict()
-        return values if self.within else {key: value for key, value in values.items() if key != "within"}
 
     def recipe(self, task: str) -> Recipe:
         """Recipe of a task's demonstrations."""

@@ -21,6 +21,7 @@ class Declaration(BaseModel):
 
     noun: ClassVar[str]  # for people, such as "recipe"
     error: ClassVar[type[ErIlError]]  # of values that are no such declaration
+    later: ClassVar[tuple[str, ...]] = ()  # keys that are left out at their default: what is written stays as it was
 
     @classmethod
     def from_file(cls, path: Path) -> Self:
@@ -60,7 +61,9 @@ class Declaration(BaseModel):
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for JSON or YAML."""
-        return self.model_dump(mode="json")
+        fields = type(self).model_fields
+        usual = {name for name in self.later if getattr(self, name) == fields[name].default}
+        return self.model_dump(mode="json", exclude=usual)
 
 
 def read_declaration[T](path: Path, noun: str, error: type[ErIlError], build: Callable[[object], T]) -> T:

@@ -8,7 +8,7 @@ from pydantic import Field, StrictStr, model_validator
 
 from er_il.arms.presets import PRESETS
 from er_il.envs.tasks import task_id
-from er_il.experiments.grid import Count, GridError, Names, Seed
+from er_il.experiments.grid import Count, GridError, Names, Seed, check_distinct
 from er_il.rl.modes import has_controller
 from er_il.support.declaration import Declaration
 from er_il.support.errors import UnknownNameError
@@ -63,10 +63,7 @@ class AgentGrid(Declaration):
             task_id(task)
         for mode in self.modes:
             has_controller(mode)
-        for key in ("modes", "training_seeds"):
-            values = getattr(self, key)
-            if twice := sorted({str(value) for value in values if values.count(value) > 1}):
-                raise GridError(f"{key} names {', '.join(twice)} twice.")
+        check_distinct(self, "modes", "training_seeds")
         return self
 
     def settings(self, variant: str) -> Mapping[str, Any]:
