@@ -44,7 +44,7 @@ from er_il.datasets.history import read_history
 from er_il.datasets.joint_paths import read_joint_paths
 from er_il.datasets.proposals import find_joints
 from er_il.datasets.schema import SOURCE_ACTION, SOURCE_JOINTS, STATE, dimension_names
-from er_il.datasets.verification import verify
+from er_il.datasets.verification import read_whole, verify
 from er_il.datasets.wiring import Wiring, read_wirings
 from er_il.robots.processors import DecodePolicyAction
 from er_il.spaces.spec import ACTION
@@ -109,7 +109,7 @@ def given(error: str) -> list[str]:
 
 def checked(root: Path) -> Dataset:
     """An encoded dataset whose actions decode to the joints that it kept, from measured ones."""
-    verification = verify(root, 1, lambda done, total: None)
+    verification = verify(*read_whole(root), 1, lambda done, total: None)
     assert verification.compared and not verification.broken() and not any(verification.findings.values())
     assert max(each.error.max() for each in verification.episodes) < 1e-3
     dataset = Dataset(root)
@@ -207,7 +207,8 @@ def test_back_in_joints_lerobot_merges_it_with_the_source(
     assert loaded.num_frames == 2 * sum(LENGTHS)
     rows = Dataset(merged).vectors(ACTION)
     assert np.allclose(rows[: sum(LENGTHS)], rows[sum(LENGTHS) :], atol=1e-3)
-    checked_again = verify(tmp_path / "back", 1, lambda done, total: None)  # the record says what its actions mean
+    # The record says what its actions mean.
+    checked_again = verify(*read_whole(tmp_path / "back"), 1, lambda done, total: None)
     assert not checked_again.broken()
     er_il("encode", tmp_path / "back", "--to", "task", "--out", tmp_path / "task")
     assert Dataset(tmp_path / "task").layout.kind == "task"

@@ -88,6 +88,7 @@ def _verify(
 
     from er_il.cli.progress import make_progress
     from er_il.datasets.space_checks import verify_in_spaces
+    from er_il.datasets.verification import read_whole
     from er_il.datasets.verification import verify as verify_dataset
     from er_il.report.tables import terminal_table
     from er_il.report.text import sentences, table
@@ -96,6 +97,7 @@ def _verify(
     from er_il.support.provenance import provenance
     from er_il.support.workers import cores
 
+    read, layout = read_whole(root, wirings, episodes)
     with make_progress(console) as progress:
 
         def check(what: str, function: Any, *more: Any) -> Any:
@@ -104,11 +106,11 @@ def _verify(
             def shown(done: int, total: int) -> None:
                 progress.update(bar, completed=done, total=total)
 
-            return function(root, cores(), shown, wirings, episodes, *more)
+            return function(read, layout, cores(), shown, *more)
 
         verification = check("Verify", verify_dataset, poses)
         sound = not (verification.findings or verification.broken())
-        in_spaces = check("Try spaces", verify_in_spaces) if verification.layout.kind == JOINT and sound else {}
+        in_spaces = check("Try spaces", verify_in_spaces) if layout.kind == JOINT and sound else {}
     report = {"meta": provenance() | {"dataset": dataset}} | verification.report()
     report["spaces"] = {kind: each.report()["arms"] for kind, each in in_spaces.items()}
     console.print(f"{report['frames']} frames, {report['episodes']} episodes", highlight=False)

@@ -130,12 +130,28 @@ class Verification:
         }
 
 
+def read_whole(root: Path, wirings: Sequence[Wiring] = (), chosen: Collection[int] = ()) -> tuple[Dataset, Layout]:
+    """A dataset whose files are whole, and the layout of its actions.
+
+    Args:
+        root: Folder of a dataset.
+        wirings: The arms of a dataset that does not know them; its actions are their joints.
+        chosen: Numbers of the episodes to look at; all if empty.
+
+    Raises:
+        ErIlError: nothing says what its actions mean, it is no dataset, or has no such episode.
+    """
+    dataset = Dataset(root)
+    check_whole(dataset)
+    dataset, layout = read_layout(dataset, wirings)
+    return selected(dataset, chosen), layout
+
+
 def verify(
-    root: Path,
+    dataset: Dataset,
+    layout: Layout,
     workers: int,
     on_progress: Callable[[int, int], object],
-    wirings: Sequence[Wiring] = (),
-    chosen: Collection[int] = (),
     poses: Sequence[str] = (),
 ) -> Verification:
     """Decode a dataset's actions and compare them with the joint vectors that were encoded.
@@ -144,21 +160,16 @@ def verify(
     the step before.
 
     Args:
-        root: Folder of a dataset.
+        dataset: The dataset, such as :func:`read_whole` gives.
+        layout: The layout of its actions.
         workers: Number of worker processes.
         on_progress: Called with the number of frames done, and their total.
-        wirings: The arms of a dataset that does not know them; its actions are their joints.
-        chosen: Numbers of the episodes to look at; all if empty.
         poses: Column that holds end-effector poses, then their dimensions in it; found by their names and values if
             omitted.
 
     Raises:
-        ErIlError: nothing says what its actions mean, it is no dataset, or has no such episode or column.
+        ErIlError: it has no such column, or is damaged.
     """
-    dataset = Dataset(root)
-    check_whole(dataset)
-    dataset, layout = read_layout(dataset, wirings)
-    dataset = selected(dataset, chosen)
     truth = dataset.joints_column(layout)
     episodes = read_encoded_episodes(dataset, layout, truth)
     problems = number_problems(dataset, layout)
