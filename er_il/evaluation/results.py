@@ -21,8 +21,8 @@ RESULTS = "results.json"  # the report of a grid, from which everything is rende
 EPISODES = "episodes.csv.gz"
 
 CELL = ["task", "decoder", "demonstrations"]
-KINDS = {"demonstrations": int, "within": float}  # of the values that tell cells apart, beside names
 WITHIN = "within"  # one more of a cell, in grids that vary where initial states are drawn
+KINDS = {"demonstrations": int, WITHIN: float}  # of the values that tell cells apart, beside names
 LABELS = [*CELL, "training_seed"]
 COUNTS = ["seed", "success", "failure", "steps", "invalid", "max_joint_step"]
 COLUMNS = [*LABELS, *COUNTS, "elbow_error"]  # of a CSV; in memory there are statuses and latencies, too

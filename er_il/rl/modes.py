@@ -1,6 +1,6 @@
 """The action modes of agents: those of the environments, and JAiLeR, which acts through a controller that it learns."""
 
-from er_il.envs.learning import MODES, space_name
+from er_il.envs.learning import MODES
 from er_il.spaces.joint import JOINT
 from er_il.spaces.registry import AT
 from er_il.support.errors import UnknownNameError
@@ -20,7 +20,6 @@ def has_controller(mode: str) -> bool:
         return True
     if mode.partition(AT)[0] not in MODES:
         raise UnknownNameError("mode", mode, AGENT_MODES)
-    space_name(mode)
     return False
 
 

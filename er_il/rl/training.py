@@ -10,7 +10,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from stable_baselines3 import SAC
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
@@ -72,7 +71,6 @@ class AgentTraining:
             probe = stack.enter_context(closing(self.make_env()))
             if self.finished:
                 return self.milestones
-            np.seterr(under="ignore")
             envs = DummyVecEnv([self.make_env] * self.settings.environments)
             stack.enter_context(closing(envs))
             return _Run(self, probe, envs, advance).learn()
