@@ -14,13 +14,13 @@ from scipy.spatial.transform import Rotation
 from er_il import Arm
 from er_il.cli import USER_MISTAKE, main
 from er_il.datasets.dataset import Dataset
-from er_il.datasets.retargeting_report import _intervals
 from er_il.datasets.schema import LEADER_JOINTS, STATE
 from er_il.kinematics.arm_angle import STEREO, ArmAngle, wrapped
 from er_il.kinematics.reach import reach, shoulder
 from er_il.kinematics.solver import kinematics_of
 from er_il.spaces.retargeting import Retargeting
 from er_il.spaces.spec import ACTION
+from er_il.support.series import stretches
 
 pytestmark = pytest.mark.usefixtures("quiet_logging", "one_worker")
 
@@ -110,8 +110,8 @@ def test_speeds_count_by_the_joints_limits() -> None:
 
 
 def test_stretches_have_their_first_and_last_frame() -> None:
-    assert _intervals(np.array([True, True, False, True])) == [[0, 1], [3, 3]]
-    assert _intervals(np.zeros(3, dtype=bool)) == []
+    assert stretches(np.array([True, True, False, True])) == [[0, 1], [3, 3]]
+    assert stretches(np.zeros(3, dtype=bool)) == []
 
 
 @pytest.fixture(scope="module")

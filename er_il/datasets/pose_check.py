@@ -17,6 +17,7 @@ from er_il.kinematics.forward import forward_of
 from er_il.kinematics.frame_fit import LENGTH, SIMPLER, SLACK, FrameFit, fit_frames, inverse
 from er_il.kinematics.pose_codes import CODES, PoseCode
 from er_il.spaces.motors import UNITS, Motors
+from er_il.support.series import percentiles
 
 Array = NDArray[np.float64]
 
@@ -85,8 +86,8 @@ class PoseCheck:
             "T_recorded_base": T_recorded_base.tolist(),
             "T_ee_recorded": T_ee_recorded.tolist(),
             "undetermined": self.fit.undetermined,
-            "position_mm": _percentiles(1e3 * self.distance),
-            "rotation_deg": _percentiles(np.rad2deg(self.angle)),
+            "position_mm": percentiles(1e3 * self.distance, PERCENTILES),
+            "rotation_deg": percentiles(np.rad2deg(self.angle), PERCENTILES),
             "joint_names": list(self.joints.motors.joints),
             "untold": list(self.untold),
             "cause": self.cause,
@@ -261,8 +262,3 @@ def _same(T: Array, frames: Mapping[str, Array]) -> str:
         gaps[name] = np.linalg.norm(T[:3, 3] - frame[:3, 3]), 2.0 * np.arcsin(min(turn, 1.0))
     near = {name: gap for name, gap in gaps.items() if gap[0] <= SAME[0] and gap[1] <= SAME[1]}
     return min(near, key=lambda name: near[name], default="")
-
-
-def _percentiles(values: Vector) -> dict[str, float]:
-    found = np.percentile(values, PERCENTILES).tolist()
-    return {f"p{share}": value for share, value in zip(PERCENTILES, found, strict=True)}

@@ -11,9 +11,10 @@ from er_il.datasets.decoding import read_encoded_episodes
 from er_il.datasets.joint_paths import joint_vectors
 from er_il.datasets.retargeted import COMMANDED, Retargeted, RetargetedArm
 from er_il.spaces.base import Array
-from er_il.spaces.deviation import Deviation, Flags
+from er_il.spaces.deviation import Deviation
 from er_il.spaces.retargeting import Retargeting
 from er_il.support.errors import DatasetError
+from er_il.support.series import stretches
 from er_il.support.workers import cores
 
 COUNTED, ERRORS = ("off_elbow", "off_pose", "too_fast"), ("position", "rotation", "arm_angle")  # of a Deviation
@@ -30,7 +31,7 @@ def retargeting_report(retargeted: Retargeted) -> dict[str, Any]:
         for what, deviations in arm.deviations.items():
             for number, each in zip(retargeted.source.episodes, deviations, strict=True):
                 if each.missed.any() or each.too_fast.any():
-                    found = _summary([each], arm.new.space.arm) | {"intervals": _intervals(each.missed)}
+                    found = _summary([each], arm.new.space.arm) | {"intervals": stretches(each.missed)}
                     episodes.setdefault(number, {}).setdefault(arm.name, {})[what] = found
     frames, count = retargeted.source.frames, retargeted.source.count
     return {"frames": frames, "episodes": count, "arms": arms, "by_episode": dict(sorted(episodes.items()))}
@@ -53,12 +54,6 @@ def _summary(deviations: Sequence[Deviation], arm: Arm) -> dict[str, Any]:
         "limits": {joint: int(count) for joint, count in zip(arm.joints, limits, strict=True) if count},
         "speeds": {joint: float(ratio) for joint, ratio in zip(arm.joints, speeds, strict=True) if ratio > 1.0},
     }
-
-
-def _intervals(flags: Flags) -> list[list[int]]:
-    """First and last frame of each stretch of flags (T,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
-    return [[int(first), int(stop) - 1] for first, stop in edges.reshape(-1, 2)]
 
 
 def compare_with(original: Dataset, retargeted: Retargeted) -> dict[str, Any]:

@@ -28,6 +28,7 @@ from er_il.spaces.joint_choice import singular_intervals
 from er_il.spaces.layout import Layout, Part
 from er_il.spaces.pose import POSITION_NAMES, TASK, PoseSpace
 from er_il.spaces.round_trip import EXACT, SINGULAR
+from er_il.support.series import percentiles
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -104,10 +105,10 @@ class Verification:
             error, clear = self.gathered("error")[arm], self.gathered("error", unflagged=True)[arm]
             arms[label] = {
                 "space": self.layout.kind,
-                "joint_error": _percentiles(error) if self.compared else None,
-                "joint_error_unflagged": _percentiles(clear) if self.compared else None,
-                "position_error": _percentiles(self.gathered("position_error")[arm]),
-                "rotation_error": _percentiles(self.gathered("rotation_error")[arm]),
+                "joint_error": percentiles(error, PERCENTILES) if self.compared else None,
+                "joint_error_unflagged": percentiles(clear, PERCENTILES) if self.compared else None,
+                "position_error": percentiles(self.gathered("position_error")[arm], PERCENTILES),
+                "rotation_error": percentiles(self.gathered("rotation_error")[arm], PERCENTILES),
                 "flagged": int(sum(each.flagged[:, arm].sum() for each in self.episodes)),
                 "broken": int(sum(each.broken[:, arm].sum() for each in self.episodes)),
                 "quaternions_other_side": self.other_side.get(label, 0.0),
@@ -293,11 +294,3 @@ def _measured_positions(dataset: Dataset, label: str) -> Array | None:
             columns = [names.index(prefix + name) for name in POSITION_NAMES]
             return dataset.vectors(STATE)[:, columns].astype(np.float64)
     return None
-
-
-def _percentiles(values: Array) -> dict[str, float]:
-    if not len(values):
-        return {}
-    return {
-        f"p{share}": float(value) for share, value in zip(PERCENTILES, np.percentile(values, PERCENTILES), strict=True)
-    }

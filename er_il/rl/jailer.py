@@ -5,6 +5,7 @@ pose, in the units of the action mode ``task``, and the controller answers it wi
 mode ``joint``: each decision is one of both.
 """
 
+from dataclasses import dataclass
 from typing import Any
 
 import gymnasium
@@ -99,20 +100,16 @@ def _states(observations: Any) -> Floats:
     return observations[STATE] if isinstance(observations, dict) else observations
 
 
+@dataclass(frozen=True, eq=False)
 class _Transitions:
     """Of the controller, in all environments."""
 
-    def __init__(
-        self,
-        seen: Floats,
-        chosen: Floats,
-        rewards: NDArray[np.float64],
-        dones: NDArray[np.bool_],
-        infos: list[dict[str, Any]],
-        afterwards: Floats,
-    ) -> None:
-        self.seen, self.chosen, self.rewards = seen, chosen, rewards
-        self.dones, self.infos, self.afterwards = dones, infos, afterwards
+    seen: Floats
+    chosen: Floats
+    rewards: NDArray[np.float64]
+    dones: NDArray[np.bool_]
+    infos: list[dict[str, Any]]
+    afterwards: Floats  # completed in place once the next goals are known
 
 
 class _Blank(gymnasium.Env[Floats, Floats]):

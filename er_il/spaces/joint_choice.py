@@ -30,6 +30,7 @@ from er_il.spaces.pose import PoseSpace
 from er_il.spaces.registry import ERJ, make_arm_space
 from er_il.spaces.round_trip import SINGULAR, round_trips_of
 from er_il.support.errors import ArmError
+from er_il.support.series import stretches
 
 Choice = tuple[str, ...]  # the n-6 joints that ERJ commands
 
@@ -106,9 +107,10 @@ def sensitivity(redundancy: Redundancy, q: Array) -> Sensitivity:
 
 def singular_intervals(smallest: Vector) -> list[SingularInterval]:
     """Intervals of a path near a singularity, by its smallest singular values (T,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], smallest < SINGULAR, [False]]).astype(int)))
-    ranges = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
-    return [SingularInterval(first, stop - 1, float(smallest[first:stop].min())) for first, stop in ranges]
+    return [
+        SingularInterval(first, last, float(smallest[first : last + 1].min()))
+        for first, last in stretches(smallest < SINGULAR)
+    ]
 
 
 def crossings(self_motion: Vector) -> int:

@@ -20,6 +20,7 @@ from er_il.spaces.joint_choice import crossings, sensitivity, singular_intervals
 from er_il.spaces.pose import PoseSpace
 from er_il.spaces.registry import make_arm_space
 from er_il.spaces.round_trip import SINGULAR
+from er_il.support.series import percentiles
 from er_il.support.workers import run_jobs
 
 DATA = "data"  # name of the one set of demonstrations
@@ -101,9 +102,9 @@ def _drift(drift: TaskDrift, paths: Sequence[JointPath]) -> dict[str, Any]:
     of_episode = [float(each.max()) for each in drift.elbow]
     worst = int(np.argmax(of_episode))
     return {
-        "elbow_m": _percentiles(elbow),
+        "elbow_m": percentiles(elbow, SHARES),
         "end_m": float(np.median([each[-1] for each in drift.elbow])),
-        "joint_rad": _percentiles(np.concatenate(drift.joints)),
+        "joint_rad": percentiles(np.concatenate(drift.joints), SHARES),
         "followed": drift.followed,
         "worst_episode": paths[worst].episode,
         "worst_step": int(drift.elbow[worst].argmax()),
@@ -140,8 +141,3 @@ def _space(arm: Arm, row: dict[str, Any], q: Sequence[Array]) -> dict[str, Any]:
         "folds": sum(crossings(each.self_motion) for each in sensed),
         "curve": np.concatenate([margins(space.redundancy, path) for path in q]).round(DIGITS).tolist(),
     }
-
-
-def _percentiles(values: Vector) -> dict[str, float]:
-    found = np.percentile(values, SHARES).tolist()
-    return {f"p{share}": value for share, value in zip(SHARES, found, strict=True)}
