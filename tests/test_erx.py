@@ -196,7 +196,8 @@ def test_fitted_coordinates_are_farther_from_folds_than_any_joint(arm: Arm) -> N
     fitted, given = margins_along(space, demos), margins_along(erx("erx", arm), demos)
     joints = margins_along(erx("erj", arm), demos)
     assert fitted.smallest > joints.smallest and fitted.smallest >= given.smallest - 1e-3
-    assert (fitted.folds, fitted.risk) == (0, 0.0)
+    assert (fitted.folds, fitted.flips, fitted.risk) == (0, 0.0, 0.0)
+    assert 1.0 < fitted.condition_p50 <= fitted.condition_p95 < joints.condition_p95
     assert space.redundancy is not None
     seen = margins(space.redundancy, demos[fitted.demo])
     assert seen[fitted.step] == seen.min() == fitted.smallest

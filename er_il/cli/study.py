@@ -128,7 +128,7 @@ def margins(study: OmitArgPrefixes[StudyOptions]) -> None:
     """
     study.check()
     from er_il.experiments.studies.margins import study_margins
-    from er_il.report.margins import margins_figure, margins_texts
+    from er_il.report.margins import margins_figure, margins_texts, playback_texts
     from er_il.report.tables import terminal_table
     from er_il.support.workers import cores
 
@@ -136,7 +136,7 @@ def margins(study: OmitArgPrefixes[StudyOptions]) -> None:
         return study_margins(arm, demos, cores(), advance)
 
     def shown(report: dict[str, Any]) -> list[Any]:
-        return [terminal_table(margins_texts(report)), *report["notes"]]
+        return [*map(terminal_table, (margins_texts(report), playback_texts(report))), *report["notes"]]
 
     study.run("margins", measure, shown, margins_figure)
 

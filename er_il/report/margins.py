@@ -37,16 +37,28 @@ def notes(report: Report) -> list[str]:
 def margins_texts(report: Report) -> pd.DataFrame:
     """Texts of the study's table, a row per space, the one first that stays farthest from its folds everywhere."""
     sets = by_demos(report)
-    smallest = {
-        space: min(of_set[space]["smallest"] for of_set in sets.values()) for space in next(iter(sets.values()))
-    }
-    return table("margins", sets=sets, spaces=sorted(smallest, key=smallest.__getitem__, reverse=True))
+    return table("margins", sets=sets, spaces=_ranked(sets))
+
+
+def playback_texts(report: Report) -> pd.DataFrame:
+    """Texts of what IK meets along the demonstrations: conditioning and changes of branch, in the same order."""
+    sets = by_demos(report)
+    return table("playback", sets=sets, spaces=_ranked(sets))
 
 
 def margins_table(report: Report) -> str:
-    """The margins of every space along each set of demonstrations; then the notes."""
+    """The margins of every space along each set of demonstrations, conditioning and flips; then the notes."""
     listed = "\n".join(f"- {note}" for note in notes(report))
-    return f"{markdown_table(margins_texts(report))}\n\n{listed}"
+    tables = (margins_texts(report), playback_texts(report))
+    return "\n\n".join([*map(markdown_table, tables), listed])
+
+
+def _ranked(sets: dict[str, dict[str, Report]]) -> list[str]:
+    """The spaces, the one first whose smallest margin of all is the largest."""
+    smallest = {
+        space: min(of_set[space]["smallest"] for of_set in sets.values()) for space in next(iter(sets.values()))
+    }
+    return sorted(smallest, key=smallest.__getitem__, reverse=True)
 
 
 @styled

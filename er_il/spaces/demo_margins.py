@@ -11,7 +11,7 @@ from er_il.kinematics.arm_angle import ArmAngle
 from er_il.kinematics.linear_coordinates import LinearCoordinates
 from er_il.kinematics.self_motion import margins, self_motions
 from er_il.spaces.base import Array
-from er_il.spaces.joint_choice import crossings, off_branch, sensitivity
+from er_il.spaces.joint_choice import crossings, flips, off_branch, sensitivity
 from er_il.spaces.pose import PoseSpace
 from er_il.spaces.round_trip import SINGULAR
 
@@ -26,7 +26,10 @@ class DemoMargins:
     p05: float
     p50: float
     folds: int  # that demonstrations cross, all together
+    flips: float  # changes of branch in a demo's playback, on average
     off: float  # share of the steps of playback whose joints were on another branch than the demo's
+    condition_p50: float  # largest by smallest singular value of what is left to IK, 1 m weighing as 1 rad
+    condition_p95: float
     risk: float  # share of the steps near a singularity or off, as of :class:`er_il.spaces.joint_choice.Fitness`
 
 
@@ -35,10 +38,12 @@ def margins_along(space: PoseSpace, demos: Sequence[Array]) -> DemoMargins:
     assert space.redundancy is not None
     q, ends = np.concatenate(demos), np.cumsum([len(demo) for demo in demos])
     found, sensed = margins(space.redundancy, q), sensitivity(space.redundancy, q)
-    off = np.concatenate(off_branch(space, demos))
+    by_demo = off_branch(space, demos)
+    off = np.concatenate(by_demo)
     worst = int(found.argmin())
     demo = int(np.searchsorted(ends, worst, side="right"))
     low, middle = np.percentile(found, [5, 50]).tolist()
+    typical, large = np.percentile(sensed.condition, [50, 95]).tolist()
     return DemoMargins(
         smallest=float(found[worst]),
         demo=demo,
@@ -46,7 +51,10 @@ def margins_along(space: PoseSpace, demos: Sequence[Array]) -> DemoMargins:
         p05=low,
         p50=middle,
         folds=sum(map(crossings, np.split(sensed.self_motion, ends[:-1]))),
+        flips=flips(by_demo),
         off=float(off.mean()),
+        condition_p50=typical,
+        condition_p95=large,
         risk=float((off | (sensed.smallest < SINGULAR)).mean()),
     )
 

@@ -143,13 +143,18 @@ def along_demos(arm: Arm, choice: Choice, demos: Sequence[Array]) -> Fitness:
         _fitness(arm, choice, q, found, risky),
         folds=float(np.mean([crossings(each) for each in np.split(found.self_motion, ends)])),
         off=float(np.concatenate(off).mean()),
-        flips=float(np.mean([np.count_nonzero(np.diff(each)) for each in off])),
+        flips=flips(off),
     )
 
 
 def off_branch(space: PoseSpace, demos: Sequence[Array]) -> list[NDArray[np.bool_]]:
     """The steps (T,) of each demo whose joints are on another branch in playback."""
     return [play_back(space, demo, np.random.default_rng(i)) > FLIP for i, demo in enumerate(demos)]
+
+
+def flips(off: Sequence[NDArray[np.bool_]]) -> float:
+    """Changes of branch in a demo's playback, on average, by the steps (T,) of each that are on another branch."""
+    return float(np.mean([np.count_nonzero(np.diff(each)) for each in off]))
 
 
 def play_back(space: PoseSpace, demo: Array, rng: np.random.Generator) -> Vector:
