@@ -296,7 +296,7 @@ def test_commands_that_cannot_work_are_one_line(places, tmp_path, monkeypatch, c
         (("encode", old, *panda, *out), "version v2.1, not v3.0"),
         (("encode", killed, *panda, *out), "is damaged, as by a recording that was killed"),
         (("encode", source, "--to", "erj", *out), "does not say which arm it is of"),
-        (("encode", source, "--to", "polar", *panda[2:], *out), "Unknown action space 'polar'"),
+        (("encode", source, "--to", "polar", *out), "Unknown action space 'polar'"),
         (("encode", places / "erj", *panda, *out), "leave out --arm"),
         (("encode", source, *panda, "--out", places / "erj"), "The target exists already"),
         (("verify", source), "does not say which arm it is of"),

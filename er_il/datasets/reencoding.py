@@ -20,6 +20,7 @@ from er_il.datasets.wiring import Wiring
 from er_il.spaces.chunk import CHUNK, commands_of
 from er_il.spaces.joint import JOINT
 from er_il.spaces.layout import Layout
+from er_il.spaces.registry import split_name
 from er_il.spaces.relative import RelativeActions
 from er_il.spaces.spec import ACTION
 from er_il.support.atomic_files import check_absent, check_outside, check_writable
@@ -68,6 +69,7 @@ def reencode(
         ErIlError: the dataset, the arms or the space do not fit.
         FileExistsError: the target exists.
     """
+    split_name(kind)  # raises if there is none
     dataset = Dataset(find_dataset(source))
     check_whole(dataset)
     dataset, known = read_layout(dataset, wirings)
