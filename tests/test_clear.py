@@ -169,6 +169,18 @@ def test_where_it_cannot_work_it_says_so(monkeypatch: pytest.MonkeyPatch) -> Non
     assert DECODERS["task-nearest"].works_in(world) and not DECODERS["task-clear"].works_in(world)
 
 
+def test_a_grid_can_hide_the_joints_from_the_policies_of_every_space(tmp_path: Path) -> None:
+    grid = Grid.from_file(data_dir("configs") / "joints_unseen.yaml")
+    cells = [Cell("reach_cup", decoder, 32) for decoder in ("era", "erx")]
+    unseen, seen = (
+        [Plan(each, tmp_path).training(cell, 0) for cell in cells] for each in (grid, grid.replaced(joints_seen=True))
+    )
+    for hidden, plain in zip(unseen, seen, strict=True):
+        (hiding,) = hidden.needs
+        assert isinstance(hiding, HideJoints) and hiding.needs == plain.needs and hidden.path != plain.path
+        assert hiding.space == hidden.space and hiding.dataset(hiding.space) != plain.needs[0].dataset(plain.space)
+
+
 def test_its_policies_in_the_table_are_of_task_space_and_do_not_see_the_joints(reach_cup: Path, tmp_path: Path) -> None:
     plan = Plan(Grid.from_file(data_dir("configs") / "table1.yaml"), tmp_path)
     clear, nearest = (plan.training(Cell("reach_cup", name, 32), 0) for name in ("task-clear", "task-nearest"))

@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Self
 
-from pydantic import AliasChoices, Field, StrictFloat, StrictInt, StrictStr, model_validator
+from pydantic import AliasChoices, Field, StrictBool, StrictFloat, StrictInt, StrictStr, model_validator
 
 from er_il.arms.robot import robot_arms
 from er_il.datasets.recipe import Recipe
 from er_il.envs.tasks import WITHIN, takes_option, task_names
-from er_il.evaluation.posture_baselines import POSTURE_BASELINES, space_of
+from er_il.evaluation.posture_baselines import POSTURE_BASELINES, UNSEEN_ELBOW, space_of
 from er_il.support.declaration import Declaration
 from er_il.support.errors import ErIlError, UnknownNameError
 from er_il.support.resources import data_dir
@@ -59,7 +59,7 @@ class Grid(Declaration):
 
     noun = "grid"
     error = GridError
-    later = ("within",)
+    later = ("within", "joints_seen")
 
     title: StrictStr
     tasks: Annotated[Names, Field(min_length=1)]
@@ -74,6 +74,7 @@ class Grid(Declaration):
     # [m] sides of the squares in which the object starts in rollouts, whatever its range was in the demonstrations;
     # the task's own range if empty
     within: tuple[Width, ...] = ()
+    joints_seen: StrictBool = True  # by policies, beside the hand; those of task-clear never see them
     introduction: StrictStr = ""  # a paragraph for the page
     arm: StrictStr = "panda"
     configuration: StrictStr = ""  # kind of training, such as images_small: configs/act_<space>_images_small.yaml
@@ -123,6 +124,10 @@ class Grid(Declaration):
         cameras = self.cameras.get(task, ())
         recipe = Recipe.load(task, self.arm).replaced(cameras=cameras, seed=self.recording_seed)
         return recipe if self.episodes is None else recipe.resized(self.episodes)
+
+    def sees_joints(self, cell: Cell) -> bool:
+        """True if the policies of a cell observe the joint angles, beside the hand."""
+        return self.joints_seen and cell.decoder not in UNSEEN_ELBOW
 
     def seeds_of(self, cell: Cell) -> tuple[int, ...]:
         """Training seeds whose policies a cell rolls out: all, but of a posture baseline only the first."""

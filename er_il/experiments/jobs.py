@@ -56,9 +56,9 @@ class Demonstrate(Job):
 
 @dataclass(frozen=True)
 class DeriveDataset(Job):
-    """Make a dataset of one space out of the demonstrations."""
+    """Make a dataset of one space out of the demonstrations, or of another one that is made out of them."""
 
-    needs: tuple[Demonstrate]
+    needs: "tuple[Demonstrate | DeriveDataset]"
     space: str
 
     @property
@@ -79,6 +79,7 @@ class FitWeights(DeriveDataset):
     The others are encoded by the same weights.
     """
 
+    needs: tuple[Demonstrate]
     demonstrations: int  # the first ones of the training episodes
 
     stage = "Fit"

@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import Any
 
 from er_il.datasets.record import DatasetRecord
-from er_il.evaluation.posture_baselines import UNSEEN_ELBOW, space_of
+from er_il.evaluation.posture_baselines import space_of
 from er_il.evaluation.rollout import FIRST_SEED
 from er_il.experiments.cell_plan import CellPlan
 from er_il.experiments.grid import Cell, Grid
@@ -68,17 +68,17 @@ class Plan(CellPlan[Grid, Cell, RollOut]):
 
     def _source(self, cell: Cell) -> Demonstrate | DeriveDataset:
         """What makes the dataset of a cell's policy."""
-        demonstrated, count = self._demonstrations[cell.task], cell.demonstrations
-        space = space_of(cell.decoder)
-        if cell.decoder in UNSEEN_ELBOW:
-            path = self.out / "unseen" / cell.task / space
-            return HideJoints(path, f"hide the joints of {cell.task} {space}", (demonstrated,), 1, space)
-        if commands_of(space) != ERX:
-            return demonstrated
-        path = self.out / "fitted" / cell.task / f"{space}-{count}-demonstrations"
-        return FitWeights(
-            path, f"fit {space} to {count} demonstrations of {cell.task}", (demonstrated,), 1, space, count
-        )
+        demonstrated, space = self._demonstrations[cell.task], space_of(cell.decoder)
+        source, name = demonstrated, space
+        if commands_of(space) == ERX:
+            count = cell.demonstrations
+            name = f"{space}-{count}-demonstrations"
+            fit = f"fit {space} to {count} demonstrations of {cell.task}"
+            source = FitWeights(self.out / "fitted" / cell.task / name, fit, (demonstrated,), 1, space, count)
+        if self.grid.sees_joints(cell):
+            return source
+        path = self.out / "unseen" / cell.task / name
+        return HideJoints(path, f"hide the joints of {cell.task} {name}", (source,), 1, space)
 
     def training(self, cell: Cell, seed: int) -> Train:
         """The training of a cell's policy."""
@@ -86,7 +86,7 @@ class Plan(CellPlan[Grid, Cell, RollOut]):
         configuration = self.grid.configuration
         steps = self.grid.steps or default_steps(default_config(space, configuration))
         variant = f"{count}-demonstrations-{steps}-steps-seed-{seed}"
-        if unseen := cell.decoder in UNSEEN_ELBOW:
+        if unseen := not self.grid.sees_joints(cell):
             variant += "-joints-unseen"
         return Train(
             self.out / "policies" / task / space / f"{variant}.json",
