@@ -3,7 +3,9 @@
 import json
 import os
 import shutil
+import signal
 from collections.abc import Callable
+from concurrent.futures import BrokenExecutor
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +26,7 @@ from er_il.policy.training import train_episodes
 from er_il.support.atomic_files import atomic_folder, check_outside, check_writable, write_json
 from er_il.support.errors import ErIlError
 from er_il.support.failures import explanation
+from er_il.support.workers import LocalExecutor
 
 GOLDEN = Path(__file__).parent / "golden"
 INFO, STATS, TASKS = "meta/info.json", "meta/stats.json", "meta/tasks.parquet"
@@ -243,6 +246,17 @@ def test_our_own_mistakes_keep_their_traceback(error: Exception, monkeypatch: py
         cli.main()
     assert "report it" in caught.value.__notes__[-1]
     assert explanation(error) is None
+
+
+def test_a_worker_that_the_system_killed_is_no_bug() -> None:
+    with pytest.raises(BrokenExecutor) as caught, LocalExecutor(1) as workers:
+        workers.submit(_kill_self).result()
+    said = explanation(caught.value)
+    assert said is not None and said.startswith("A worker process was killed")
+
+
+def _kill_self() -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
 
 
 def test_a_full_disk_is_told_with_the_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
