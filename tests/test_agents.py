@@ -24,11 +24,13 @@ from er_il.envs import make_rl_env
 from er_il.evaluation.trace import Trace
 from er_il.rl.assessment import environment_of
 from er_il.rl.checkpoint import POLICY, STATE, last_checkpoint, load_state
+from er_il.rl.controller import ControllerView
 from er_il.rl.demonstrator import AgentDemonstrator
 from er_il.rl.evaluation import roll_out
 from er_il.rl.learner import make_sac
 from er_il.rl.loading import load_agent
 from er_il.rl.pixels import shifted
+from er_il.rl.scaling import state_scale
 from er_il.rl.settings import Settings, SettingsError
 from er_il.rl.training import AgentTraining
 from er_il.robots.command_line import RobotCommand
@@ -97,9 +99,19 @@ def test_an_interrupted_training_goes_on_from_its_checkpoint(trained: AgentTrain
     assert [each.steps for each in replace(whole, steps=130).run()] == [64, 128, 130]
 
 
+def test_networks_see_what_is_left_to_a_goal_ten_times_as_large(trained: AgentTraining) -> None:
+    names = trained.make_env().observation_names
+    scale = weights(trained)["actor.features_extractor.scale"]  # comes with the weights of the policy
+    small = [name.endswith((".dx", ".dy", ".dz", ".left")) for name in names]
+    assert scale.tolist() == [10.0 if each else 1.0 for each in small] and sum(small) > 7
+    shares = ControllerView(names).inputs[-6:]
+    assert state_scale(shares) == [1.0] * 6  # shares of the largest changes are large already
+
+
 def test_a_checkpoint_brings_everything_back(trained: AgentTraining) -> None:
     envs = DummyVecEnv([trained.make_env] * SMALL.environments)
-    fresh = make_sac(envs, SMALL, seed=7)
+    names = trained.make_env().observation_names
+    fresh = make_sac(envs, names, SMALL, seed=7)
     folder = last_checkpoint(trained.out)
     assert folder is not None
     progress = load_state(folder / STATE, {"task": fresh})

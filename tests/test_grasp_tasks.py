@@ -1,6 +1,7 @@
 """Take Lid Off Saucepan, Pick and Lift, Pick Up Cup: judgement, grasps and placements."""
 
 import gymnasium
+import mujoco
 import numpy as np
 import pytest
 
@@ -12,7 +13,7 @@ from sim_tasks.tasks.take_lid_off_saucepan import LIFT, SAUCEPAN, TakeLidOffSauc
 from sim_tasks.world.blocks import BLOCK
 from sim_tasks.world.contact import touching
 from sim_tasks.world.robot import FINGER_TRAVEL
-from sim_tasks.world.saucepan import KNOB_RADIUS
+from sim_tasks.world.saucepan import KNOB_MIDDLE, KNOB_RADIUS
 from sim_tasks.world.tableware import CUP_RADIUS
 
 TASKS = {name: f"sim_tasks/{name}-v0" for name in ("TakeLidOffSaucepan", "PickAndLift", "PickUpCup")}
@@ -114,6 +115,20 @@ def test_blocks_leave_room_for_the_fingers_and_the_mark_is_above_the_bench() -> 
         assert min(gaps) > LEAST
         heights.append(world.position(MARK)[2])
     assert 0.15 <= min(heights) < 0.2 and 0.3 < max(heights) <= 0.35
+
+
+@pytest.mark.parametrize(
+    ("away", "opening", "taken"), [(0.0, 1.0, True), (0.02, 1.0, True), (0.05, 1.0, False), (0.0, 0.0, False)]
+)
+def test_what_is_between_the_fingers_is_taken_as_they_begin_to_close(away: float, opening: float, taken: bool) -> None:
+    world = make("TakeLidOffSaucepan")
+    world.reset(seed=0)
+    held = np.append(world.nominal_start, opening)
+    world.step(held)  # fingers that were told to close before do not begin to
+    world.data.joint("lid").qpos[:3] = world.tip - (0.0, away, KNOB_MIDDLE)
+    mujoco.mj_forward(world.model, world.data)
+    world.step(np.append(world.nominal_start, 0.0))
+    assert world.grasped == taken
 
 
 @pytest.mark.parametrize(("offset", "taken"), [((0.0, 0.0, 0.032), True), ((-0.085, 0.0, 0.0), False)])

@@ -30,7 +30,7 @@ def state(position: Any = (0, 0, 0), turn: Any = (0, 0, 0), velocity: Any = (0, 
 def test_the_controller_sees_the_arm_and_what_is_asked_for() -> None:
     seen = VIEW.observe(state(velocity=(3, 4), left=(5, 6)), np.array([[0.5, 0, 0, 0, 0, -1, 1]]))
     assert seen[0] == pytest.approx([0.1, 0.2, 3, 4, 5, 6, 0.5, 0, 0, 0, 0, -1])
-    assert VIEW.dimension == 12
+    assert len(VIEW.inputs) == 12
 
 
 def test_a_goal_is_a_change_of_the_measured_pose() -> None:

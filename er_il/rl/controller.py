@@ -35,9 +35,9 @@ class ControllerView:
         return [i for ending in (".pos", ".vel", ".left") for i in self._of(ending)]
 
     @property
-    def dimension(self) -> int:
-        """Number of the controller's inputs."""
-        return len(self.columns) + len(GOAL_NAMES)
+    def inputs(self) -> tuple[str, ...]:
+        """Names of what the controller observes."""
+        return (*(self.names[i] for i in self.columns), *(f"{name}.share" for name in GOAL_NAMES))
 
     def observe(self, states: Floats, changes: Floats) -> Floats:
         """The controller's observations (N, 3n + 6) from states (N, s) and the changes asked for (N, 6) in [-1, 1]."""

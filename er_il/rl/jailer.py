@@ -42,7 +42,7 @@ class Jailer(VecEnvWrapper):
         actions = gymnasium.spaces.Box(-1.0, 1.0, (len(GOAL_NAMES) + 1,), np.float32)
         super().__init__(envs, action_space=actions)
         self._view, self._settings, self._rewarded = ControllerView(names), settings, rewarded
-        self.controller = make_sac(_Blank.side_by_side(envs, self._view), settings, seed)
+        self.controller = make_sac(_Blank.side_by_side(envs, self._view), self._view.inputs, settings, seed)
         self._states: Floats = np.empty(0, np.float32)  # (N, s) of now
         self._goals: tuple[NDArray[np.float64], Rotation] | None = None
         self._waiting: _Transitions | None = None  # until the next goals are known
@@ -124,4 +124,4 @@ class _Blank(gymnasium.Env[Floats, Floats]):
         """As many as ``envs``, for the controller of these."""
         assert envs.action_space.shape is not None
         joints = envs.action_space.shape[0] - 1
-        return DummyVecEnv([lambda: cls(view.dimension, joints)] * envs.num_envs)
+        return DummyVecEnv([lambda: cls(len(view.inputs), joints)] * envs.num_envs)

@@ -9,14 +9,16 @@ from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.sac.policies import Actor, SACPolicy
 
 from er_il.rl.pixels import ShiftedExtractor
+from er_il.rl.scaling import ScaledExtractor, state_scale
 from er_il.rl.settings import Settings
 
 
-def make_sac(envs: VecEnv, settings: Settings, seed: int) -> SAC:
+def make_sac(envs: VecEnv, names: Sequence[str], settings: Settings, seed: int) -> SAC:
     """SAC for environments side by side.
 
     Args:
         envs: Where it is to learn.
+        names: Of the state's dimensions.
         settings: How.
         seed: Of its networks and actions; also seeds the global generators of torch and NumPy, which it draws from.
     """
@@ -33,20 +35,19 @@ def make_sac(envs: VecEnv, settings: Settings, seed: int) -> SAC:
         train_freq=1,
         gradient_steps=settings.updates,
         ent_coef=f"auto_{settings.temperature}",
-        policy_kwargs=_network(images, settings.layers, settings.shift),
+        policy_kwargs=_network(images, settings.layers, state_scale(names), settings.shift),
         seed=seed,
         device="auto" if images else "cpu",  # small networks are slower on a GPU
     )
 
 
 def make_actor(observations: gymnasium.Space[Any], actions: gymnasium.spaces.Box, layers: Sequence[int]) -> Actor:
-    """The network of an actor as SAC has it, untrained."""
+    """The network of an actor as SAC has it, untrained: how it scales the state comes with its weights."""
     images = isinstance(observations, gymnasium.spaces.Dict)
-    return SACPolicy(observations, actions, lambda _: 0.0, **_network(images, layers, 0)).actor
+    return SACPolicy(observations, actions, lambda _: 0.0, **_network(images, layers, (), 0)).actor
 
 
-def _network(images: bool, layers: Sequence[int], shift: int) -> dict[str, Any]:
-    network: dict[str, Any] = {"net_arch": list(layers)}
-    if images:
-        network |= {"features_extractor_class": ShiftedExtractor, "features_extractor_kwargs": {"shift": shift}}
-    return network
+def _network(images: bool, layers: Sequence[int], scale: Sequence[float], shift: int) -> dict[str, Any]:
+    extractor = {"features_extractor_kwargs": {"scale": scale} | ({"shift": shift} if images else {})}
+    extractor |= {"features_extractor_class": ShiftedExtractor if images else ScaledExtractor}
+    return {"net_arch": list(layers)} | extractor

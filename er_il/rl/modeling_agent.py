@@ -54,7 +54,7 @@ class AgentPolicy(PreTrainedPolicy):
         self.controller: Actor | None = None
         if self._view:
             joints = len(config.action_names) - 1
-            self.controller = make_actor(_vector(self._view.dimension), _shares(joints), config.layers)
+            self.controller = make_actor(_vector(len(self._view.inputs)), _shares(joints), config.layers)
 
     def reset(self) -> None:
         """Begin an episode; an agent remembers nothing."""

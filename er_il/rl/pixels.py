@@ -1,17 +1,25 @@
 """Features of images and state, with the random shifts of DrQ (Kostrikov et al. 2021, arXiv 2004.13649) in training."""
 
+from collections.abc import Sequence
+
 import gymnasium
 import torch
 from stable_baselines3.common.torch_layers import CombinedExtractor
 from torch.nn import functional
 
+from er_il.envs.learning import STATE
+from er_il.rl.scaling import ScaledExtractor
+
 
 class ShiftedExtractor(CombinedExtractor):
     """Stable-Baselines3's networks for images and vectors; in training each image is shifted by a few pixels."""
 
-    def __init__(self, observation_space: gymnasium.spaces.Dict, shift: int) -> None:
-        """Prepare for shifts of up to ``shift`` pixels along each axis."""
+    def __init__(self, observation_space: gymnasium.spaces.Dict, scale: Sequence[float], shift: int) -> None:
+        """Prepare for shifts of up to ``shift`` pixels along each axis, and for states multiplied by ``scale``."""
         super().__init__(observation_space)
+        state = observation_space[STATE]
+        assert isinstance(state, gymnasium.spaces.Box)
+        self.extractors[STATE] = ScaledExtractor(state, scale)
         self._shift = shift
 
     def forward(self, observations: dict[str, torch.Tensor]) -> torch.Tensor:

@@ -137,7 +137,7 @@ class _Run(BaseCallback):
             outer = jailer = Jailer(envs, probe.observation_names, settings, seed, rewarded)
             self._controller = jailer.controller
             self._controller.set_logger(configure(str(logs / "controller"), ["tensorboard"]))
-        self._sac = make_sac(_Scaled(VecMonitor(outer), settings.reward_scale), settings, seed)
+        self._sac = make_sac(_Scaled(VecMonitor(outer), settings.reward_scale), probe.observation_names, settings, seed)
         self._sac.set_logger(configure(str(logs), ["tensorboard"]))
         self._milestones: list[Milestone] = []
         self._invalid = self._decisions = 0  # since the last milestone

@@ -1,21 +1,31 @@
-"""Rigid grasps: what both fingers touch when they close is welded to the hand until they open, as in RLBench."""
+"""Rigid grasps: what is between the fingers when they close is welded to the hand until they open, as in RLBench.
+
+There, a proximity sensor in the hand detects it. Here it is what is near the point between the fingertips as they begin
+to close, or what both of them touch.
+"""
 
 from collections.abc import Collection, Sequence
 
 import mujoco
 import numpy as np
 
-from sim_tasks.world.contact import touches_shape, touching
+from sim_tasks.world.contact import collision_geoms, distance, touches_shapes
 from sim_tasks.world.household import grip_name
-from sim_tasks.world.robot import HAND
+from sim_tasks.world.props import SPHERE
+from sim_tasks.world.robot import HAND, TIP
 
+SENSOR = "proximity_sensor"
+RANGE = 0.01  # [m] around the point between the fingertips in which a thing is detected
 CLOSED = 0.5  # opening below which the fingers are told to close
 STIFF = (0.008, 1.0)  # [s] time constant, damping ratio: two time steps of 4 ms, the stiffest that is stable
 RIGID = (0.99, 0.999, 0.001, 0.5, 2.0)  # impedance: a weld of the usual one gives way to the fingers' force
 
 
 def add_attachments(spec: mujoco.MjSpec, bodies: Sequence[str]) -> None:
-    """Prepare bodies to be attached to the hand; none is at first."""
+    """Prepare bodies to be attached to the hand, which gets a sensor; none is at first."""
+    if bodies:
+        unseen = {"contype": 0, "conaffinity": 0, "group": 4, "mass": 0}
+        spec.body(TIP).add_geom(name=SENSOR, type=SPHERE, size=(RANGE, 0, 0), **unseen)
     for body in bodies:
         weld = spec.add_equality(
             name=_weld(body), type=mujoco.mjtEq.mjEQ_WELD, objtype=mujoco.mjtObj.mjOBJ_BODY, name1=HAND, name2=body
@@ -28,33 +38,41 @@ class Attachment:
     """Attaches one body at a time to the hand of a compiled world, which :func:`add_attachments` prepared."""
 
     def __init__(self, model: mujoco.MjModel, bodies: Sequence[str], fingers: Sequence[Collection[int]]) -> None:
-        """Attach ``bodies`` when all of the groups of bodies ``fingers`` touch them, at their grip if they have one."""
+        """Attach ``bodies``, at their grip if they have one.
+
+        Args:
+            model: The world.
+            bodies: Names of free bodies.
+            fingers: Ids of each finger's bodies.
+        """
         self._model = model
         self._fingers = fingers
         self._bodies = {name: (model.body(name).id, model.equality(_weld(name)).id) for name in bodies}
-        grips = {name: mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, grip_name(name)) for name in bodies}
-        self._grips = {name: geom for name, geom in grips.items() if geom >= 0}
+        self._shapes = {name: _graspable_shapes(model, name) for name in bodies}
+        self._sensor = model.geom(SENSOR).id if bodies else -1
         self._hand = model.body(HAND).id
-        self.held = ""  # the body that is attached
+        self.forget()
 
     def forget(self) -> None:
         """Start an episode: MuJoCo has released everything."""
-        self.held = ""
+        self.held = ""  # the body that is attached
+        self._was_open = True  # told to be
 
     def update(self, data: mujoco.MjData, opening: float) -> None:
         """Attach or release, given the opening in [0, 1] that the fingers are told to have."""
         if opening >= CLOSED:
             self._release(data)
         elif not self.held:
-            for name in self._bodies:
-                if all(self._touches(data, finger, name) for finger in self._fingers):
-                    self._attach(data, name)
-                    return
+            found = self._detected if self._was_open else self._touched
+            if name := next((name for name in self._bodies if found(data, name)), ""):
+                self._attach(data, name)
+        self._was_open = opening >= CLOSED
 
-    def _touches(self, data: mujoco.MjData, finger: Collection[int], name: str) -> bool:
-        if name in self._grips:
-            return touches_shape(self._model, data, finger, self._grips[name])
-        return touching(self._model, data, finger, {self._bodies[name][0]})
+    def _detected(self, data: mujoco.MjData, name: str) -> bool:
+        return distance(self._model, data, (self._sensor,), self._shapes[name]) <= 0.0
+
+    def _touched(self, data: mujoco.MjData, name: str) -> bool:
+        return all(touches_shapes(self._model, data, finger, self._shapes[name]) for finger in self._fingers)
 
     def _attach(self, data: mujoco.MjData, name: str) -> None:
         body, weld = self._bodies[name]
@@ -74,6 +92,11 @@ class Attachment:
         if self.held:
             data.eq_active[self._bodies[self.held][1]] = 0
             self.held = ""
+
+
+def _graspable_shapes(model: mujoco.MjModel, name: str) -> tuple[int, ...]:
+    grip = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, grip_name(name))
+    return (grip,) if grip >= 0 else collision_geoms(model, {model.body(name).id})
 
 
 def _weld(body: str) -> str:

@@ -14,10 +14,12 @@ def touching(model: mujoco.MjModel, data: mujoco.MjData, one: Collection[int], o
     return next(_between(model, data, one, other), None) is not None
 
 
-def touches_shape(model: mujoco.MjModel, data: mujoco.MjData, bodies: Collection[int], geom: int) -> bool:
-    """True if any body of a group touches a shape."""
-    pairs = data.contact.geom
-    others = np.concatenate([pairs[pairs[:, 0] == geom, 1], pairs[pairs[:, 1] == geom, 0]])
+def touches_shapes(
+    model: mujoco.MjModel, data: mujoco.MjData, bodies: Collection[int], shapes: Collection[int]
+) -> bool:
+    """True if any body of a group touches any of the shapes."""
+    one, other = data.contact.geom.T
+    others = np.concatenate([one[np.isin(other, list(shapes))], other[np.isin(one, list(shapes))]])
     return bool(np.isin(model.geom_bodyid[others], list(bodies)).any())
 
 
