@@ -5,6 +5,7 @@ import re
 import runpy
 import shlex
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -18,17 +19,19 @@ from lerobot.datasets.utils import BackwardCompatibilityError
 from lerobot.utils.feature_utils import dataset_to_policy_features
 from packaging.version import Version
 from public_schemas import (
+    AXIS_ANGLE,
     DROID_JOINTS,
     G1,
     LENGTHS,
     PANDA,
     Columns,
     agibot,
+    beside_poses,
     droid,
     joint_paths,
     lagged,
     libero,
-    uma,
+    older,
     unitree,
     write_columns,
 )
@@ -37,7 +40,7 @@ from er_il import Arm
 from er_il.cli import USER_MISTAKE, main
 from er_il.cli.arm_options import ArmOptions
 from er_il.datasets.changes import are_changes
-from er_il.datasets.column_source import following
+from er_il.datasets.column_source import ColumnSource, following
 from er_il.datasets.dataset import Dataset
 from er_il.datasets.described import described
 from er_il.datasets.history import read_history
@@ -50,7 +53,8 @@ from er_il.robots.processors import DecodePolicyAction
 from er_il.spaces.spec import ACTION
 from er_il.support.errors import DatasetError
 
-SCHEMAS = {each.__name__: each for each in (droid, uma, libero, unitree, agibot)}
+SCHEMAS = {each.__name__: each for each in (droid, beside_poses, libero, unitree)}
+SCHEMAS |= {"agibot": partial(agibot, named=False)}
 COMMANDED = np.concatenate(joint_paths()).astype(np.float32)
 NEXT = np.concatenate([np.concatenate([q[1:], q[-1:]]) for q in joint_paths()]).astype(np.float32)
 JOINTS = ("--arm", "panda", "--joints", *DROID_JOINTS)
@@ -124,7 +128,7 @@ def checked(root: Path) -> Dataset:
 
 
 def test_joints_beside_poses_are_proposed_and_the_proposal_works(places: Path, tmp_path: Path, er_il) -> None:
-    encode = ("encode", places / "uma", "--to", "erj", "--arm", "panda", "--out", tmp_path / "out")
+    encode = ("encode", places / "beside_poses", "--to", "erj", "--arm", "panda", "--out", tmp_path / "out")
     error = er_il(*encode)
     assert "Which dimensions are the joints of panda" in error
     assert "The joints of panda seem to be in action.joint_position (joint_0, " in error
@@ -133,12 +137,12 @@ def test_joints_beside_poses_are_proposed_and_the_proposal_works(places: Path, t
     said = er_il(*encode, *given(error))
     assert "The joint vectors are from action.joint_position; action:gripper." in said
     assert "Renamed to source.*, since LeRobot takes every column named action* for actions: action.joint_pos" in said
-    dataset, source = checked(tmp_path / "out"), Dataset(places / "uma")
+    dataset, source = checked(tmp_path / "out"), Dataset(places / "beside_poses")
     assert dataset.names(ACTION)[-1] == "gripper"
     assert np.array_equal(dataset.vectors(SOURCE_JOINTS)[:, :7], COMMANDED)
     assert np.array_equal(dataset.vectors(SOURCE_ACTION), source.vectors(ACTION))
     kept = json.loads((tmp_path / "out/meta/stats.json").read_text())
-    before = json.loads((places / "uma/meta/stats.json").read_text())
+    before = json.loads((places / "beside_poses/meta/stats.json").read_text())
     assert kept["source.action.joint_position"] == before["action.joint_position"]
     assert "action.joint_position" not in kept
     loaded = LeRobotDataset("lab/out", root=tmp_path / "out", video_backend="pyav")
@@ -151,7 +155,7 @@ def test_joints_beside_poses_are_proposed_and_the_proposal_works(places: Path, t
 def test_changes_are_not_taken_for_angles(places: Path, tmp_path: Path, er_il, arm: str) -> None:
     source = places / "libero" if arm == "panda" else libero(tmp_path / "xarm", Arm.preset(arm))
     encode = ("encode", source, "--to", "erj", "--arm", arm, "--out", tmp_path / "out")
-    error = er_il(*encode, "--joints", "x", "y", "z", "roll", "pitch", "yaw", "gripper")
+    error = er_il(*encode, "--joints", *AXIS_ANGLE, "gripper")
     assert f"look like changes (deltas), not like angles of {arm}: they stay around zero" in error
     assert given(error) == given(er_il(*encode))
     assert given(error)[:3] == ["--from", "observation.states.joint_state", "action:gripper"]
@@ -266,32 +270,36 @@ def test_what_is_left_out_is_said(places: Path, tmp_path: Path, er_il) -> None:
 
 
 def test_commands_that_cannot_work_are_one_line(places: Path, tmp_path: Path, er_il) -> None:
-    other = uma(tmp_path / "other")
+    other = beside_poses(tmp_path / "other")
     info = json.loads((other / "meta/info.json").read_text())
     (other / "meta/info.json").write_text(json.dumps(info | {"fps": 15}))
-    short = droid(tmp_path / "short")
+    short = beside_poses(tmp_path / "short")
     path = short / "data/chunk-000/file-000.parquet"
     table = pq.read_table(path)
     swapped = np.repeat(np.arange(2), LENGTHS[::-1])
     table = table.set_column(table.schema.get_field_index("episode_index"), "episode_index", pa.array(swapped))
     pq.write_table(table, path)
+    encode = ("encode", places / "beside_poses", "--to", "erj", "--out", tmp_path / "out")
     for words, message in (
         (
             ("--from", "action.joints"),
-            "Unknown column of .*uma 'action.joints'. Valid: action, action.j",
+            "Unknown column of .*beside_poses 'action.joints'. Valid: action, action.j",
         ),
         (("--from", "action:elbow"), "Unknown dimension of action 'elbow'. Valid: x, y, z"),
         (("--from", "acton:gripper"), "Unknown column, or folder of a dataset, 'acton'. Valid: action, "),
         (("--from", f"{tmp_path}:action"), "is not a LeRobot v3 dataset"),
-        (("--from", f"{other}:action"), "other has 15 frames a second, .*uma has 20: they do not match"),
-        (("--from", f"{short}:action"), "Episode 0 of .*short has 9 frames, that of .*uma 12: they do not match"),
+        (("--from", f"{other}:action"), "other has 15 frames a second, .*beside_poses has 20: they do not match"),
+        (
+            ("--from", f"{short}:action"),
+            "Episode 0 of .*short has 9 frames, that of .*poses 12: they do not match",
+        ),
         (("--from", "action", "--joints", "elbow"), "Unknown dimension of the action 'elbow'"),
         (("--from", "action.joint_position", "--joints", "elbow"), "Unknown dimension of the joint vector 'elbow'"),
         (("--from", "action.joint_position", "action.joint_position:joint_0"), "A dimension is given twice"),
     ):
-        error = er_il("encode", places / "uma", "--to", "erj", "--arm", "panda", "--out", tmp_path / "out", *words)
+        error = er_il(*encode, "--arm", "panda", *words)
         assert re.search(message, error), error
-    error = er_il("encode", places / "uma", "--to", "erj", "--out", tmp_path / "out", "--from", "action.joint_position")
+    error = er_il(*encode, "--from", "action.joint_position")
     assert "--from and --state-from say where an arm's joints are: give --arm or --arms, too." in error
 
 
@@ -306,36 +314,6 @@ def test_the_command_that_converts_an_old_dataset_works(places: Path, tmp_path: 
     runpy.run_module(words[0], run_name="__main__")
     er_il(*encode)
     assert np.allclose(checked(tmp_path / "out").vectors(SOURCE_ACTION)[:, :7], COMMANDED)
-
-
-def older(source: Path, target: Path) -> Path:
-    """A dataset as LeRobot wrote them in version 2.1: a file an episode, metadata in lines of JSON."""
-    dataset = Dataset(source)
-    info = json.loads((source / "meta/info.json").read_text())
-    table = pq.read_table(source / "data")
-    (target / "data/chunk-000").mkdir(parents=True)
-    (target / "meta").mkdir()
-    episodes, stats = [], []
-    for number, rows in dataset.episodes.items():
-        pq.write_table(
-            table.slice(rows.start, rows.stop - rows.start), target / f"data/chunk-000/episode_{number:06d}.parquet"
-        )
-        episodes.append({"episode_index": number, "tasks": ["move"], "length": rows.stop - rows.start})
-        of_columns = {}
-        for name in dataset.features:
-            values = dataset.column(name)[rows].astype(np.float64)
-            of_columns[name] = {
-                each: getattr(np, each)(values, axis=0).tolist() for each in ("min", "max", "mean", "std")
-            }
-            of_columns[name]["count"] = [len(values)]
-        stats.append({"episode_index": number, "stats": of_columns})
-    lines = {"episodes": episodes, "episodes_stats": stats, "tasks": [{"task_index": 0, "task": "move"}]}
-    for name, entries in lines.items():
-        (target / f"meta/{name}.jsonl").write_text("".join(json.dumps(each) + "\n" for each in entries))
-    info |= {"codebase_version": "v2.1", "total_chunks": 1, "total_videos": 0}
-    info["data_path"] = "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet"
-    (target / "meta/info.json").write_text(json.dumps(info))
-    return target
 
 
 def test_an_old_dataset_on_the_hub_is_told(er_il, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -398,6 +376,16 @@ def test_numbers_of_unnamed_dimensions_do_not_tie_a_state_to_joints(tmp_path: Pa
 )
 def test_names_are_found_however_they_are_nested(names, found) -> None:
     assert dimension_names({"names": names, "shape": (3,)}) == found
+
+
+@pytest.mark.parametrize("column", ["observation.state", "state", "joint_position", "joint_state", "source.state"])
+def test_columns_are_measured_unless_their_names_say_otherwise(column: str) -> None:
+    assert ColumnSource(Dataset(Path()), column, ()).measured
+
+
+@pytest.mark.parametrize("column", ["action", "actions.joint", "leader.joints", "source.joints", "joint_targets"])
+def test_names_of_columns_tell_commands(column: str) -> None:
+    assert not ColumnSource(Dataset(Path()), column, ()).measured
 
 
 def test_the_last_frame_of_an_episode_commands_itself() -> None:

@@ -16,7 +16,7 @@ from chains import write_chain
 from documented import PAGES, ROOT, Block, blocks, entry_point, run, train_in_process
 from foreign import write_bimanual, write_one_arm, write_openarm
 from lerobot.policies.act.configuration_act import ACTConfig
-from public_schemas import libero, uma
+from public_schemas import beside_poses, libero
 
 import er_il.cli
 from er_il import Arm
@@ -59,7 +59,7 @@ def prepare_real_arm(folder: Path) -> None:
 
 def prepare_reencoding(folder: Path) -> None:
     write_bimanual(folder / "my_robot")
-    uma(folder / "poses")
+    beside_poses(folder / "poses")
     libero(folder / "deltas")
 
 

@@ -25,8 +25,8 @@ class ArmOptions:
     """Link in which poses are expressed; the URDF's root if omitted."""
     from_: Annotated[Names, arg(name="from")] = ()
     """Columns that hold the joints, if action does not: COLUMN, or COLUMN:NAME,NAME for some of its dimensions, either
-    also after DATASET: for another dataset of the same frames. What observation* and state* measured commands the frame
-    before."""
+    also after DATASET: for another dataset of the same frames. What was measured commands the frame before: all columns
+    that are not named as actions, commands, goals, targets or a leader's."""
     state_from: Names = ()
     """Columns of the measured joints, likewise, if observation.state does not have them: it becomes what they hold."""
     joints: Names = ()

@@ -1,5 +1,6 @@
 """Where joint values are read from: some or all dimensions of a column, of this dataset or of another one."""
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,9 +10,10 @@ import numpy as np
 
 from er_il.datasets.dataset import Dataset, Floats
 from er_il.datasets.hub import find_dataset
+from er_il.datasets.schema import SOURCE_JOINTS
 from er_il.support.errors import DatasetError, UnknownNameError
 
-MEASURED = ("observation", "state")  # starts of the names of columns that were measured, not commanded
+COMMANDED = re.compile(r"action|command|cmd|control|desired|goal|leader|master|target", re.I)  # in names of columns
 
 
 @dataclass(frozen=True)
@@ -59,8 +61,8 @@ class ColumnSource:
 
     @property
     def measured(self) -> bool:
-        """True if the column's name says that its values were measured."""
-        return self.column.startswith(MEASURED)
+        """True unless the column's name says that its values were commanded."""
+        return self.column != SOURCE_JOINTS and not COMMANDED.search(self.column)
 
     @cached_property
     def named(self) -> bool:

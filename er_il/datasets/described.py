@@ -57,12 +57,12 @@ def described(dataset: Dataset, wirings: Sequence[Wiring]) -> tuple[Dataset, Lay
     if ACTION not in dataset.features and not any(each.from_ for each in wirings):
         hints = [proposal(dataset, each.build_arm(), each.label) for each in wirings]
         given = "name the columns of the joints with --from or in the file of arms."
-        raise DatasetError(" ".join([f"{dataset.root} has no column {ACTION}: {given}", *filter(None, hints)]))
+        raise DatasetError(" ".join([f"{dataset.root} has no column {ACTION}: {given}", *hints]))
     whole, resolved = assembled(dataset, wirings)
     try:
         layout = wire(resolved, whole.features, JOINT, Quaternion.kind)
     except JointsNotFoundError as error:
-        raise DatasetError(f"{error} {proposal(dataset, error.arm, error.label)}".rstrip()) from error
+        raise DatasetError(f"{error} {proposal(dataset, error.arm, error.label)}") from error
     for part in layout.parts:
         _check_no_changes(dataset, whole, layout, part)
     return whole, layout
@@ -87,7 +87,7 @@ def _check_no_changes(recorded: Dataset, dataset: Dataset, layout: Layout, part:
             f"around zero, {why}."
         )
         column = dataset.parts[ACTION].sources[0].column if isinstance(dataset, Assembled) else ACTION
-        raise DatasetError(f"{text} {proposal(recorded, arm, label, exclude=column)}".rstrip())
+        raise DatasetError(f"{text} {proposal(recorded, arm, label, exclude=column)}")
 
 
 def _measured(recorded: Dataset, dataset: Dataset, layout: Layout, part: Part) -> Array | None:

@@ -74,7 +74,10 @@ def proposal(dataset: Dataset, arm: Arm, label: str = "", exclude: str = "") -> 
     """Where the joints of an arm seem to be and what to give, in a sentence or two; see :func:`find_joints`."""
     found = find_joints(dataset, arm, label, exclude)
     if not found:
-        return ""
+        return (
+            f"No column of {dataset.root} seems to hold the joints of {label or arm.name}. If another dataset of the "
+            "same frames does, give --from DATASET:COLUMN."
+        )
     keys = _keys(dataset, arm, found)
     if label:
         lists = {key: "deg" if key == "units" else _yaml(values) for key, values in keys.items()}

@@ -14,7 +14,7 @@ from er_il.datasets.history import SPECIFICATION, read_history
 from er_il.datasets.hub import find_dataset
 from er_il.datasets.integrity import check_whole
 from er_il.datasets.number_checks import check_numbers
-from er_il.datasets.schema import SOURCE, STATE
+from er_il.datasets.schema import IMAGES, SOURCE, STATE
 from er_il.datasets.weights import WeightsFile
 from er_il.datasets.wiring import Wiring
 from er_il.spaces.chunk import CHUNK, commands_of
@@ -84,11 +84,12 @@ def reencode(
     check_numbers(dataset, layout if not encoded else dataset.layout)
     from er_il.datasets import card  # LeRobot: seconds of imports; mistakes are told before
     from er_il.datasets.encoding import decode_dataset, encode_dataset
-    from er_il.datasets.source_columns import columns_to_restore, other_actions
+    from er_il.datasets.source_columns import columns_to_restore, other_actions, unseen_cameras
 
     read_history(dataset.root)  # raises if it is damaged
     restored = decode and columns_to_restore(dataset, layout) is not None
-    notes = _notes(dataset, keep, () if decode else other_actions(dataset))
+    moved, cameras = ((), {}) if decode else (other_actions(dataset), unseen_cameras(dataset))
+    notes = _notes(dataset, keep, moved, tuple(cameras))
     done = 0
 
     def advance(frames: int) -> None:
@@ -127,7 +128,7 @@ def _named(source: ColumnSource, dataset: Dataset) -> str:
     return f"{source.dataset.root.resolve().name}:{source.text}" if other else source.text
 
 
-def _notes(dataset: Dataset, keep: bool, moved: Sequence[str]) -> tuple[str, ...]:
+def _notes(dataset: Dataset, keep: bool, moved: Sequence[str], cameras: Sequence[str]) -> tuple[str, ...]:
     """What is not as in the source, and what is lost."""
     notes = []
     columns = _columns(dataset)
@@ -144,4 +145,6 @@ def _notes(dataset: Dataset, keep: bool, moved: Sequence[str]) -> tuple[str, ...
     if moved:
         what = f"Renamed to {SOURCE}*" if keep else "Left out"
         notes.append(f"{what}, since LeRobot takes every column named {ACTION}* for actions: {', '.join(moved)}.")
+    if cameras:
+        notes.append(f"Renamed to {IMAGES}*, since LeRobot's policies get no other cameras: {', '.join(cameras)}.")
     return tuple(notes)
