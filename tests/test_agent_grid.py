@@ -51,7 +51,7 @@ def test_the_shipped_grids_are_of_their_kinds(tmp_path: Path) -> None:
         plan = read_plan(path, tmp_path)
         assert isinstance(plan, AgentPlan)
         cells[path.stem] = len(plan.jobs)
-    assert cells == {"rl_full_body": 126, "rl_standard": 96, "rl_joints": 42, "rl_panda8": 36, "rl_time": 48}
+    assert cells == {"rl_full_body": 144, "rl_standard": 96, "rl_joints": 42, "rl_panda8": 36, "rl_time": 48}
     assert isinstance(read_plan(folder / "table1.yaml", tmp_path), Plan)
     with pytest.raises(GridError, match="There is no grid"):
         read_plan(tmp_path / "none.yaml", tmp_path)

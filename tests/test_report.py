@@ -211,7 +211,7 @@ def test_a_grid_names_its_posture_baselines_or_as_version_0_1_its_sceptics(tmp_p
     assert "sufficient on: `push_button_elbow` (`task-grasp`), `lift_cup` (`task-mean`, `task-grasp`)." in page
     assert "It is not sufficient on: `reach_cup`, `remove_cup`, `reach_remove_cup`, `retrieve_bear`." in page
     assert markdown_table(table("compact", **grid, decoders=["joint", "task-mean", "task-grasp"])) in page
-    grid["meta"]["grid"]["posture_baselines"] = grid["meta"]["grid"].pop("sceptics")
+    grid["meta"]["grid"]["sceptics"] = grid["meta"]["grid"].pop("posture_baselines")
     (tmp_path / "results.json").write_text(json.dumps(grid))
     write_pages(tmp_path)
     assert (tmp_path / "README.md").read_text() == page
