@@ -2,6 +2,7 @@ import json
 import shutil
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import chain, islice
 from pathlib import Path
 from types import SimpleNamespace
@@ -144,8 +145,12 @@ def test_from_demonstrations_to_a_rollout_with_the_stock_commands(
     back_to(in_memory, 3)  # within the second epoch: its order and its random numbers are to go on
     assert (in_memory.done_steps, in_memory.finished) == (3, False)
     assert "--resume=true" in in_memory.command
-    run_in_memory(monkeypatch, in_memory)
-    assert checkpoint_bytes(in_memory, 4) == uninterrupted
+    shutil.copytree(in_memory.dataset, tmp_path / "dataset")
+    in_memory.out.rename(tmp_path / "moved")
+    moved = replace(in_memory, out=tmp_path / "moved", dataset=tmp_path / "dataset")  # it goes on where it is now
+    run_in_memory(monkeypatch, moved)
+    assert checkpoint_bytes(moved, 4) == uninterrupted and not in_memory.out.exists()
+    assert json.loads((moved.policy / "train_config.json").read_text())["dataset"]["root"] == str(moved.dataset)
 
     config = json.loads((longer.policy / "train_config.json").read_text())
     assert config["dataset"]["episodes"] == [0, 1]

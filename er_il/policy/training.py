@@ -67,7 +67,10 @@ class Training:
         """The stock command that starts the training, or goes on where it was interrupted."""
         last = self._checkpoint
         if last is not None:
-            return [STOCK, f"--config_path={last / _PRETRAINED / 'train_config.json'}", "--resume=true", *self._length]
+            # Where dataset and output are now: either may have been moved since.
+            places = (f"--dataset.root={self.dataset}", f"--output_dir={self.out}")
+            config = last / _PRETRAINED / "train_config.json"
+            return [STOCK, f"--config_path={config}", "--resume=true", *places, *self._length]
         dataset = Dataset(self.dataset)
         info, contract = dataset.info, Contract.of_spec(dataset.spec)
         inputs = input_features(self.config, info["features"])
