@@ -80,11 +80,13 @@ def validity_figure(report: Report) -> Figure:
     pooled = _pooled(report)
     for axis, around in zip(axes[1], AROUND, strict=False):
         rows = where(pooled, around=around, damped=True)
-        rows = rows.assign(group=rows["space"].map(label_of) + "\n" + rows["mode"])
+        rows = rows.assign(group=rows["space"].map(label_of) + " " + rows["mode"])
         shares = [rows.assign(series=cause, value=100 * rows[f"causes.{cause}"] / rows["actions"]) for cause in CAUSES]
         bar_chart(axis, pd.concat(shares), CAUSES, stacked=True)
         percent_axis(axis)
         axis.set_title(f"Causes around {AROUND[around]}, all sizes")
+        for label in axis.get_xticklabels():
+            label.set(rotation=35, horizontalalignment="right", rotation_mode="anchor")
     for axis, (title, (median, tail)) in zip(axes[1, 2:], COSTS.items(), strict=True):
         most = pooled.groupby(["space", "damped"], sort=False)[[median, tail]].max().reset_index()
         most = most.assign(group=most["space"].map(label_of), series=most["damped"], value=most[median])
