@@ -169,7 +169,8 @@ def test_the_figure_of_invalid_actions_shows_shares_causes_and_costs() -> None:
     ]
     np.testing.assert_allclose(points(curves)["ERA"], [100 * cell["invalid_rate"] for cell in era])
     np.testing.assert_allclose(error_bars(curves)[4], [100 * np.array(cell["interval"]) for cell in era], atol=1e-9)
-    assert set(points(curves)) == {f"{name}{end}" for name in ("Task", "ERJ", "ERA") for end in ("", ", undamped")}
+    names = ("Task", "ERJ", "ERA", "ERX")
+    assert set(points(curves)) == {f"{name}{end}" for name in names for end in ("", ", undamped")}
     totals = np.sum(list(bars(causes).values()), axis=0)
     pooled = [row for row in report["pooled"] if row["around"] == "demos" and row["damped"]]
     assert sorted(totals) == pytest.approx(sorted(100 * row["invalid_rate"] for row in pooled))
