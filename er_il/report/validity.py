@@ -85,8 +85,7 @@ def validity_figure(report: Report) -> Figure:
         bar_chart(axis, pd.concat(shares), CAUSES, stacked=True)
         percent_axis(axis)
         axis.set_title(f"Causes around {AROUND[around]}, all sizes")
-        for label in axis.get_xticklabels():
-            label.set(rotation=35, horizontalalignment="right", rotation_mode="anchor")
+        axis.tick_params("x", rotation=90)
     for axis, (title, (median, tail)) in zip(axes[1, 2:], COSTS.items(), strict=True):
         most = pooled.groupby(["space", "damped"], sort=False)[[median, tail]].max().reset_index()
         most = most.assign(group=most["space"].map(label_of), series=most["damped"], value=most[median])
