@@ -1,8 +1,6 @@
 """Failures of libraries that a user's files or machine cause, and the one line that tells each of them."""
 
 import os
-import signal
-from concurrent.futures import BrokenExecutor
 
 from er_il.support.errors import ErIlError
 
@@ -26,6 +24,7 @@ _OF_DATA = {
     "zipfile.BadZipFile",
     "zlib.error",
 }
+_OF_WORKERS = "concurrent.futures._base.BrokenExecutor"
 
 
 def explanation(error: BaseException) -> str | None:
@@ -37,9 +36,9 @@ def explanation(error: BaseException) -> str | None:
         return _line(": ".join(map(str, filter(None, (reason, error.filename)))))
     if isinstance(error, MemoryError):
         return "There is not enough memory."
-    if isinstance(error, BrokenExecutor) and signal.SIGKILL.name in str(error):
-        return "A worker process was killed, as the system does when memory runs out. Run the command again."
     names = {f"{kind.__module__}.{kind.__qualname__}" for kind in type(error).__mro__}
+    if _OF_WORKERS in names and "SIGKILL" in str(error):
+        return "A worker process was killed, as the system does when memory runs out. Run the command again."
     # Arrow and the hub raise plain OSErrors without a number for files and answers that they cannot read.
     if names & _OF_DATA or isinstance(error, OSError):
         return f"A file cannot be read ({type(error).__name__}): {_line(str(error))}"
