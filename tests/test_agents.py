@@ -14,6 +14,7 @@ from documented import run as documented_run
 from lerobot.datasets import LeRobotDataset
 from lerobot.scripts import lerobot_eval
 from safetensors.torch import load_file
+from stable_baselines3.common.buffers import NStepReplayBuffer, ReplayBufferSamples
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from er_il.cli import main
@@ -126,6 +127,27 @@ def test_a_checkpoint_brings_everything_back(trained: AgentTraining) -> None:
     envs.close()
 
 
+def test_no_return_reaches_beyond_a_checkpoint_into_the_next_episode(trained: AgentTraining) -> None:
+    envs = DummyVecEnv([trained.make_env] * SMALL.environments)
+    learner = make_sac(envs, trained.make_env().observation_names, SMALL, seed=0)
+    folder = last_checkpoint(trained.out)
+    assert folder is not None and SMALL.n_steps == 3
+    load_state(folder / STATE, {"task": learner})
+    buffer = learner.replay_buffer
+    assert isinstance(buffer, NStepReplayBuffer)
+    last = SMALL.milestone // SMALL.environments - 1  # decisions of each environment before the checkpoint
+    assert (buffer.dones[last] == 0).all()  # nothing ended there but by the checkpoint
+    discount = SMALL.discount
+    assert all(sample.discounts.item() == pytest.approx(discount) for sample in drawn(buffer, last))
+    assert all(sample.dones.item() == 0 for sample in drawn(buffer, last))  # the critic is asked beyond it
+    assert all(sample.discounts.item() == pytest.approx(discount**2) for sample in drawn(buffer, last - 1))
+    envs.close()
+
+
+def drawn(buffer: NStepReplayBuffer, row: int) -> list[ReplayBufferSamples]:
+    return [buffer._get_samples(np.array([row])) for _ in range(10)]
+
+
 def test_a_folder_belongs_to_one_training(trained: AgentTraining, tmp_path: Path) -> None:
     with pytest.raises(PolicyError, match=r"another training; asked for is \{'mode': 'joint'\} instead of"):
         replace(trained, mode="joint").run()
@@ -212,7 +234,9 @@ def test_an_agents_rollouts_become_datasets_and_these_policies(
 
 @pytest.mark.slow
 def test_learning_from_images(tmp_path: Path) -> None:
-    settings = SMALL.replaced(shift=4, milestone=48, batch_size=4, buffer=200, warm_up=8)
+    settings = SMALL.replaced(shift=4, milestone=48, batch_size=4, buffer=200, warm_up=8, n_steps=1)
+    with pytest.raises(SettingsError, match="n_steps must be 1"):
+        training(tmp_path / "several", pixels=True, settings=settings.replaced(n_steps=3)).run()
     seeing = training(tmp_path / "agent", mode="erj", pixels=True, steps=48, settings=settings)
     assert [each.steps for each in seeing.run()] == [48]
     agent = load_agent(seeing.out)

@@ -4,13 +4,14 @@ from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
+import numpy as np
 from stable_baselines3 import SAC
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.sac.policies import Actor, SACPolicy
 
 from er_il.rl.pixels import ShiftedExtractor
 from er_il.rl.scaling import ScaledExtractor, state_scale
-from er_il.rl.settings import Settings
+from er_il.rl.settings import Settings, SettingsError
 
 
 def make_sac(envs: VecEnv, names: Sequence[str], settings: Settings, seed: int) -> SAC:
@@ -21,8 +22,13 @@ def make_sac(envs: VecEnv, names: Sequence[str], settings: Settings, seed: int) 
         names: Of the state's dimensions.
         settings: How.
         seed: Of its networks and actions; also seeds the global generators of torch and NumPy, which it draws from.
+
+    Raises:
+        SettingsError: returns of several decisions from images, which Stable-Baselines3 does not have.
     """
     images = isinstance(envs.observation_space, gymnasium.spaces.Dict)
+    if images and settings.n_steps > 1:
+        raise SettingsError("From images, Stable-Baselines3 has no n-step returns: n_steps must be 1.")
     return SAC(
         "MultiInputPolicy" if images else "MlpPolicy",
         envs,
@@ -34,11 +40,20 @@ def make_sac(envs: VecEnv, names: Sequence[str], settings: Settings, seed: int) 
         gamma=settings.discount,
         train_freq=1,
         gradient_steps=settings.updates,
+        n_steps=settings.n_steps,
         ent_coef=f"auto_{settings.temperature}",
         policy_kwargs=_network(images, settings.layers, state_scale(names), settings.shift),
         seed=seed,
         device="auto" if images else "cpu",  # small networks are slower on a GPU
     )
+
+
+def end_episodes(learner: SAC) -> None:
+    """Let the episodes end that were under way, as if by a time limit: what follows in the memory is another one."""
+    buffer = learner.replay_buffer
+    assert buffer is not None
+    last = buffer.pos - 1
+    buffer.timeouts[last] = np.maximum(buffer.timeouts[last], 1.0 - buffer.dones[last])
 
 
 def make_actor(observations: gymnasium.Space[Any], actions: gymnasium.spaces.Box, layers: Sequence[int]) -> Actor:

@@ -38,6 +38,7 @@ class Settings(Declaration):
     buffer: Count  # transitions
     layers: Annotated[tuple[Count, ...], Field(min_length=1)]  # widths, of actor and critics alike
     reward_scale: Positive
+    n_steps: Count = 1  # decisions whose rewards an update adds up before it asks the critic; only from states
     milestone: Count  # decisions between evaluations, each with a checkpoint
     evaluations: Count  # episodes of such an evaluation
     shift: Annotated[StrictInt, Field(ge=0)] = 0  # [px] of images in training

@@ -22,7 +22,7 @@ from er_il.rl.checkpoint import POLICY, STATE, last_checkpoint, load_state, save
 from er_il.rl.evaluation import roll_out
 from er_il.rl.export import make_policy, save_policy
 from er_il.rl.jailer import Jailer
-from er_il.rl.learner import make_sac
+from er_il.rl.learner import end_episodes, make_sac
 from er_il.rl.milestones import Milestone, read_milestones, write_milestones
 from er_il.rl.modes import JAILER_REWARDED, has_controller, mode_of_environment
 from er_il.rl.settings import Settings
@@ -187,6 +187,8 @@ class _Run(BaseCallback):
     def _pause(self) -> None:
         """Evaluate, and write a checkpoint."""
         training, steps = self._training, self.num_timesteps
+        for learner in self._learners.values():
+            end_episodes(learner)  # what goes on here begins new ones
         policy = make_policy(self._probe, training, self._learners)
         seeds = range(FIRST_SEED, FIRST_SEED + training.settings.evaluations)
         done = roll_out(policy.act, self._probe, seeds)

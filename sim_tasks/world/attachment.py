@@ -15,7 +15,7 @@ from sim_tasks.world.props import SPHERE
 from sim_tasks.world.robot import HAND, TIP
 
 SENSOR = "proximity_sensor"
-RANGE = 0.01  # [m] around the point between the fingertips in which a thing is detected
+RANGE = 0.02  # [m] around the point between the fingertips, half as far as each of them, in which a thing is detected
 CLOSED = 0.5  # opening below which the fingers are told to close
 STIFF = (0.008, 1.0)  # [s] time constant, damping ratio: two time steps of 4 ms, the stiffest that is stable
 RIGID = (0.99, 0.999, 0.001, 0.5, 2.0)  # impedance: a weld of the usual one gives way to the fingers' force
