@@ -1,6 +1,7 @@
 """Environments for reinforcement learning: modes, decisions, invalid actions, ends."""
 
 import warnings
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -9,7 +10,7 @@ from gymnasium.utils.env_checker import check_env as gymnasium_check
 from stable_baselines3.common.env_checker import check_env as stable_baselines_check
 
 from er_il.envs import LearningEnv, make_rl_env
-from er_il.envs.learning import BOUNDS, DECISIONS, INVALIDS, MODES, RATE, SUCCESSES
+from er_il.envs.learning import BOUNDS, DECISIONS, INVALIDS, LEAD, MODES, RATE, SUCCESSES
 from er_il.support.errors import ArmError, NotResetError, NumbersError, ShapeError, UnknownNameError
 from sim_tasks import RL_TASKS
 
@@ -162,6 +163,21 @@ def test_ten_successes_in_a_row_truncate_and_success_is_no_end() -> None:
     assert rewards[-SUCCESSES:] == [1.0] * SUCCESSES
 
 
+@pytest.mark.parametrize("task", ["put_rubbish_in_bin", "serve_coffee_obstacles"])
+def test_a_thing_that_falls_off_the_bench_ends_an_episode(task: str) -> None:
+    env = make_rl_env(task, "joint")
+    env.reset(seed=0)
+    world: Any = env.world
+    thing = world.graspable[-1]  # whichever of them
+    world.data.joint(thing).qpos[:3] = 0.4, 0.9, 0.1  # beside the bench
+    for _ in range(20):
+        state, reward, terminated, truncated, info = env.step(np.zeros(8, np.float32))
+        if terminated:
+            break
+    assert terminated and not truncated and reward == 0.0 and info["failure"] == "fell"
+    assert np.abs(state).max() < 10  # before it is far away
+
+
 def test_an_idle_episode_is_truncated_after_the_papers_200_decisions() -> None:
     env = make_rl_env("reach_target", "joint")
     env.reset(seed=2)
@@ -231,6 +247,24 @@ def test_deltas_count_from_the_measured_joints_if_asked() -> None:
         expected = 2 * BOUNDS.angle if anchor == "command" else measured + BOUNDS.angle
         assert commands[anchor] == pytest.approx(expected, abs=1e-6)
     assert abs(commands["measured"] - commands["command"]) > 1e-3
+
+
+def test_a_command_does_not_wind_up_against_the_bench() -> None:
+    env = make_rl_env("reach_target", "task", start_range=0.0)
+    env.reset(seed=0)
+    down, up = np.zeros(7, np.float32), np.zeros(7, np.float32)
+    down[2], up[2] = -1.0, 1.0
+    free = [env.step(down)[4]["command"] for _ in range(3)]
+    expected = env.space.decode(np.array([0, 0, -BOUNDS.position, 0, 0, 0]), free[1], free[1]).q
+    np.testing.assert_array_equal(free[2], expected)  # in free motion it counts from the last command
+    for _ in range(40):
+        lead = np.abs(env._env.last_command - env.world.joint_positions).max()
+        command = env.step(down)[4]["command"]
+        assert np.abs(command - env.world.joint_positions).max() < LEAD + 0.3  # it, and one more change
+    assert lead > LEAD / 2 and env.world.tip[2] < 0.03  # pyright: ignore[reportAttributeAccessIssue]  it presses
+    height = env.world.tip[2]  # pyright: ignore[reportAttributeAccessIssue]
+    env.step(up), env.step(up), env.step(up)
+    assert env.world.tip[2] > height + 0.03  # pyright: ignore[reportAttributeAccessIssue]  and rises at once
 
 
 def test_an_episode_has_at_most_as_many_decisions_at_the_papers_pace() -> None:

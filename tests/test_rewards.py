@@ -9,11 +9,11 @@ import pytest
 
 import sim_tasks
 from sim_tasks.tasks.arm_task import ArmTask
-from sim_tasks.tasks.rewards import Reward, proximity
+from sim_tasks.tasks.rewards import Reward, closeness, proximity
 
 IDS = [entry.id for entry in (*sim_tasks.TASKS, *sim_tasks.RL_TASKS)]
 SEEDS = (0, 1000, 1_000_000)
-DIP = 0.01  # by which the reward may fall for a moment, since servos lag and overshoot
+DIP = 0.02  # by which the reward may fall for a moment, since servos lag and overshoot
 
 
 def make(task_id: str) -> ArmTask:
@@ -116,3 +116,4 @@ def test_a_reward_is_declared_with_weights_that_sum_to_one_and_success() -> None
         with pytest.raises(ValueError, match="sum to 1 and include 'success'"):
             Reward(**wrong)
     assert proximity(-0.1, 0.2) == 1.0 and proximity(0.2, 0.2) == pytest.approx(np.exp(-1))
+    assert closeness(-0.1, 0.2) == 1.0 and closeness(0.2, 0.2) == pytest.approx((np.exp(-1) + np.exp(-5)) / 2)

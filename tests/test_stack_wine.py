@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 import sim_tasks  # noqa: F401
 from sim_tasks.tasks.object_task import WIDTH
+from sim_tasks.tasks.rewards import closeness
 from sim_tasks.tasks.stack_wine import BOTTLE, NEAR, RACK, StackWine
 from sim_tasks.world.wine_rack import SEAT
 
@@ -63,7 +64,7 @@ def test_the_rack_centres_a_bottle_that_is_let_go_and_keeps_it() -> None:
 def test_a_bottle_that_is_not_held_is_worth_the_way_to_it() -> None:
     world = make()
     distance = np.linalg.norm(world.tip - world.grasp_point)
-    assert world._progress() == pytest.approx({"reach": np.exp(-distance / WIDTH), "stack": 0.0})
+    assert world._progress() == pytest.approx({"reach": closeness(distance, WIDTH), "stack": 0.0})
     lay(world, offset=(0.0, 0.0, 0.05))  # in the air above its place
     assert world._progress()["stack"] == 0.0
 

@@ -1,7 +1,8 @@
 """Environments for reinforcement learning: delta actions of every space in [-1, 1], decided at 10 Hz (paper V-A).
 
 In every mode a decision takes the same simulated time, and deltas count from the last command, unless asked otherwise.
-An action that the arm cannot do is invalid: the arm holds, and the step earns nothing.
+Against an obstacle the command stays ``LEAD`` before the joints: otherwise it would wind up, and as many decisions would
+be needed to take it back. An action that the arm cannot do is invalid: the arm holds, and the step earns nothing.
 """
 
 from collections.abc import Mapping
@@ -26,6 +27,7 @@ from er_il.support.errors import UnknownNameError
 from er_il.support.vectors import named_vector
 
 RATE = 10  # [Hz] of decisions
+LEAD = 0.1  # [rad] of a command before the joints, beyond which a change does not count from it
 BOUNDS = DeltaBounds(position=0.05, rotation=0.05, angle=0.075)  # the paper's largest changes of a decision
 SUCCESSES, INVALIDS = 10, 5  # in a row, after which an episode is truncated
 EQUAL, SETTLED = PACES = ("equal", "settled")
@@ -106,7 +108,7 @@ class LearningEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         for what, given, valid in (("pace", pace, PACES), ("anchor", anchor, ANCHORS)):
             if given not in valid:
                 raise UnknownNameError(what, given, valid)
-        self._anchored = anchor == MEASURED
+        self._lead = 0.0 if anchor == MEASURED else LEAD
         self._steps = _most_steps(mode) if pace == SETTLED else 0  # of the simulator in a decision; 0: one period
         own_limit = {"max_steps": DECISIONS * STEPS, "max_episode_steps": -1} if self._steps else {}
         world = gymnasium.make(
@@ -181,8 +183,7 @@ class LearningEnv(gymnasium.Env[Any, NDArray[np.float32]]):
 
     def _decide(self, change: NDArray[Any]) -> Step:
         """Command a change, and wait until the arm has settled if the pace is such."""
-        if self._anchored:
-            self._env.anchor()
+        self._env.anchor(self._lead)
         step = self._env.step(change)
         status = step[4]["decode_status"]
         hold = np.append(np.zeros(len(change) - 1), change[-1])

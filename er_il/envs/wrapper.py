@@ -92,10 +92,22 @@ class ActionSpaceEnv(
         """The joint angles (n,) [rad] that were commanded last, which a delta counts from; one arm after the other."""
         return np.concatenate([arm.last for arm in self._commander.arms])
 
-    def anchor(self) -> None:
-        """Let changes count from where the arms are, until the next command."""
+    def anchor(self, lead: float = 0.0) -> None:
+        """Let the next change count from where the arms are, or from the last command as far as it is near.
+
+        Args:
+            lead: How far [rad] the last command may be before the joint that is farthest behind; from farther away it
+                is brought back on a straight line.
+
+        Raises:
+            NotResetError: no episode was started.
+        """
+        if not self._started:
+            raise NotResetError
         for arm, q in zip(self._commander.arms, self._measured_arms(), strict=True):
-            arm.anchor(q)
+            left = arm.last - q
+            if (farthest := np.abs(left).max()) > lead:
+                arm.anchor(q + left * (lead / farthest))
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Start an episode; LeRobot's own options are for its wrappers and end here."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from er_il.arms.arm import Vector
 from sim_tasks.tasks.object_task import WIDTH, ObjectTask, add_goal
-from sim_tasks.tasks.rewards import Reward, proximity
+from sim_tasks.tasks.rewards import Reward, closeness
 
 MARK = "mark"
 MARK_RADIUS, MARK_COLOUR = 0.025, (0.15, 0.75, 0.25, 0.45)  # [m]; translucent
@@ -48,4 +48,4 @@ class CarryTask(GraspTask):
 
     def _lift(self) -> float:
         distance = float(np.linalg.norm(self.grasp_point - self.position(MARK)))
-        return 1.0 if distance < ARRIVED else proximity(distance, WIDTH)
+        return 1.0 if distance < ARRIVED else closeness(distance, WIDTH)

@@ -9,7 +9,7 @@ from er_il.arms.arm import Vector
 from sim_tasks.tasks.object_task import UPRIGHT, WIDTH
 from sim_tasks.tasks.placement import Placement, yawed
 from sim_tasks.tasks.release_task import ReleaseTask
-from sim_tasks.tasks.rewards import Reward, proximity
+from sim_tasks.tasks.rewards import Reward, closeness
 from sim_tasks.world.grill import Grill, add_order
 from sim_tasks.world.meat import CHICKEN, GRASP_HEIGHT, STEAK
 from sim_tasks.world.randomisation import sides, span
@@ -111,6 +111,6 @@ class MeatOffGrill(ReleaseTask):
         if distance == 0.0:
             return {"reach": 1.0, "place": 1.0, "release": self.commanded_opening if self.grasped else 1.0}
         if self.held == self.asked:
-            return {"reach": 1.0, "place": proximity(distance, WIDTH), "release": 0.0}
+            return {"reach": 1.0, "place": closeness(distance, WIDTH), "release": 0.0}
         reach = self._reach(self.grasp_point)
         return {"reach": reach, "place": 0.0, "release": 0.0}

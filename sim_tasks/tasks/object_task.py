@@ -1,7 +1,7 @@
 """The base of the paper's reinforcement-learning tasks (section V-A): things, goals and attached grasps.
 
-Contact stops the arm, but ends nothing unless a task says so. Places are those before a Panda; before a taller arm
-everything stands ``shoulder_offset`` higher.
+Contact stops the arm, but ends nothing unless a task says so; a thing that falls off the bench ends an episode. Places are
+those before a Panda; before a taller arm everything stands ``shoulder_offset`` higher.
 """
 
 from abc import abstractmethod
@@ -15,7 +15,7 @@ from er_il.arms.arm import Vector
 from er_il.support.errors import UnknownNameError
 from sim_tasks.tasks.arm_task import ArmTask
 from sim_tasks.tasks.placement import Placement
-from sim_tasks.tasks.rewards import proximity
+from sim_tasks.tasks.rewards import closeness
 from sim_tasks.world.attachment import Attachment, add_attachments
 from sim_tasks.world.contact import touching
 from sim_tasks.world.grip import slow_grip
@@ -23,9 +23,12 @@ from sim_tasks.world.props import BOX, SPHERE
 from sim_tasks.world.robot import TIP
 from sim_tasks.world.scene import BENCH_CENTRE, BENCH_SIZE
 
-WIDTH = 0.25  # [m] of the reward's kernel over every distance; the paper's, 1 m wide, is flat where learning begins
+WIDTH = (
+    0.25  # [m] of the reward's wide kernel over every distance; the paper's, 1 m wide, is flat where learning begins
+)
 TURN_WIDTH = 0.5  # [rad] of that over every angle
 TIMESTEP = 0.004  # [s] of physics
+FALLEN, FELL = 0.1, "fell"  # [m] below the bench's top at which a thing has fallen off it
 ATTACHED, FRICTION = "attached", "friction"
 GRIPS = (ATTACHED, FRICTION)
 
@@ -115,7 +118,7 @@ class ObjectTask(ArmTask):
 
     def _reach(self, point: Vector) -> float:
         """Closeness in (0, 1] of the fingertips to a point (3,) [m]."""
-        return proximity(float(np.linalg.norm(self.tip - point)), WIDTH)
+        return closeness(float(np.linalg.norm(self.tip - point)), WIDTH)
 
     def _put(self, name: str, position: Sequence[float], quaternion: Sequence[float] = UPRIGHT) -> None:
         """Put an object of an episode that begins: position [m] before a Panda, quaternion (w, x, y, z)."""
@@ -142,7 +145,8 @@ class ObjectTask(ArmTask):
         return all(touching(self.model, self.data, finger, {self._ids[name]}) for finger in self._fingers)
 
     def _fails(self) -> str:
-        return ""
+        lowest = self.shoulder_offset - FALLEN
+        return FELL if any(self.position(name)[2] < lowest for name in self.graspable) else ""
 
     def _times_out(self) -> str:
         return "timeout"

@@ -8,7 +8,7 @@ import numpy as np
 from sim_tasks.tasks.object_task import WIDTH
 from sim_tasks.tasks.placement import Placement, yawed
 from sim_tasks.tasks.release_task import ReleaseTask
-from sim_tasks.tasks.rewards import Reward, proximity
+from sim_tasks.tasks.rewards import Reward, closeness
 from sim_tasks.world.phone import HANDSET, LENGTH, BaseStation
 from sim_tasks.world.randomisation import sides, span
 
@@ -95,7 +95,7 @@ class PhoneOnBase(ReleaseTask):
         if self._in_place():
             return {"reach": 1.0, "place": 1.0, "open": self.commanded_opening if self.grasped else 1.0}
         if self.grasped:
-            return {"reach": 1.0, "place": proximity(self._left(), WIDTH), "open": 0.0}
+            return {"reach": 1.0, "place": closeness(self._left(), WIDTH), "open": 0.0}
         return {
             "reach": self._reach(self.point(PHONE, GRIP)),
             "place": 0.0,

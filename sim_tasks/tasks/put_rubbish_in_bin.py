@@ -10,7 +10,7 @@ from er_il.arms.arm import Vector
 from sim_tasks.tasks.object_task import WIDTH
 from sim_tasks.tasks.placement import Placement, yawed
 from sim_tasks.tasks.release_task import ReleaseTask
-from sim_tasks.tasks.rewards import Reward, proximity
+from sim_tasks.tasks.rewards import Reward, closeness
 from sim_tasks.world.bin import Bin
 from sim_tasks.world.randomisation import sides, span
 from sim_tasks.world.rubbish import CRUMPLED_PAPER, PAPER_MIDDLE, TOMATO
@@ -103,10 +103,10 @@ class PutRubbishInBin(ReleaseTask):
             return {"reach": reach, "carry": carry, "lower": lower, "open": opened}
         high, low = self.above_rim(HIGH), self.above_rim(LOW)
         if np.linalg.norm(rubbish[:2] - high[:2]) > OVER:
-            carry = proximity(float(np.linalg.norm(rubbish - high)), WIDTH)
+            carry = closeness(float(np.linalg.norm(rubbish - high)), WIDTH)
         else:
             carry, left = 1.0, abs(float(rubbish[2] - low[2]))
-            lower, opened = (1.0, self.commanded_opening) if left < LOWERED else (proximity(left, WIDTH), 0.0)
+            lower, opened = (1.0, self.commanded_opening) if left < LOWERED else (closeness(left, WIDTH), 0.0)
         return {"reach": 1.0, "carry": carry, "lower": lower, "open": opened}
 
 

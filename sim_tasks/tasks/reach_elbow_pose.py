@@ -16,7 +16,7 @@ from er_il.kinematics.arm_angle import ElbowCircle
 from er_il.kinematics.solver import Status, kinematics_of
 from sim_tasks.tasks.object_task import TURN_WIDTH, WIDTH, ObjectTask, add_goal
 from sim_tasks.tasks.placement import Placement
-from sim_tasks.tasks.rewards import Reward, proximity
+from sim_tasks.tasks.rewards import Reward, closeness
 from sim_tasks.world.props import BOX
 from sim_tasks.world.randomisation import sides, span
 
@@ -135,7 +135,7 @@ class ReachElbowPose(ObjectTask):
             "elbow": (self._elbow_distance(), REACHED, WIDTH),
         }
         return {
-            name: 1.0 if error <= enough else proximity(error, width) for name, (error, enough, width) in errors.items()
+            name: 1.0 if error <= enough else closeness(error, width) for name, (error, enough, width) in errors.items()
         }
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from er_il.kinematics.solver import kinematics_of
 from sim_tasks.tasks.object_task import WIDTH, ObjectTask, add_goal
 from sim_tasks.tasks.placement import Placement
-from sim_tasks.tasks.rewards import Reward, proximity
+from sim_tasks.tasks.rewards import Reward, closeness
 from sim_tasks.world.randomisation import sides
 
 BALL = "ball"
@@ -61,4 +61,4 @@ class ReachTarget(ObjectTask):
         return self._distance() < RADIUS
 
     def _progress(self) -> dict[str, float]:
-        return {"reach": 1.0 if self._succeeds() else proximity(self._distance(), WIDTH)}
+        return {"reach": 1.0 if self._succeeds() else closeness(self._distance(), WIDTH)}

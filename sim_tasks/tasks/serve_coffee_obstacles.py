@@ -12,7 +12,7 @@ import numpy as np
 from er_il.arms.arm import Vector
 from sim_tasks.tasks.object_task import TURN_WIDTH, WIDTH, ObjectTask
 from sim_tasks.tasks.placement import Area, Placement, yawed
-from sim_tasks.tasks.rewards import Reward, proximity
+from sim_tasks.tasks.rewards import Reward, closeness
 from sim_tasks.world.contact import touching
 from sim_tasks.world.crockery import Plate, mug
 from sim_tasks.world.fixed import add_fixed
@@ -103,7 +103,7 @@ class ServeCoffeeObstacles(ObjectTask):
         return bool(self.rotation(MUG)[2, 2] > STANDS and np.hypot(x, y) < ON_PLATE and abs(z) < 0.005)
 
     def _fails(self) -> str:
-        return "collision" if touching(self.model, self.data, self._carrying, self._fragile) else ""
+        return "collision" if touching(self.model, self.data, self._carrying, self._fragile) else super()._fails()
 
     def _progress(self) -> dict[str, float]:
         if self._succeeds():
@@ -112,8 +112,8 @@ class ServeCoffeeObstacles(ObjectTask):
             reach = self._reach(self.grasp_point)
             return {"reach": reach, "upright": 0.0, "waypoint": 0.0, "serve": 0.0}
         tilt = float(np.arccos(np.clip(self.rotation(MUG)[2, 2], -1.0, 1.0)))
-        carried = {"reach": 1.0, "upright": proximity(tilt - UPRIGHT_TILT, TURN_WIDTH)}
+        carried = {"reach": 1.0, "upright": closeness(tilt - UPRIGHT_TILT, TURN_WIDTH)}
         if self.position(MUG)[1] > WAYPOINT[1]:
-            return carried | {"waypoint": 1.0, "serve": proximity(float(np.linalg.norm(self._to_plate())), WIDTH)}
+            return carried | {"waypoint": 1.0, "serve": closeness(float(np.linalg.norm(self._to_plate())), WIDTH)}
         to_waypoint = float(np.linalg.norm(self.position(MUG) - WAYPOINT))
-        return carried | {"waypoint": proximity(to_waypoint, WIDTH), "serve": 0.0}
+        return carried | {"waypoint": closeness(to_waypoint, WIDTH), "serve": 0.0}

@@ -12,7 +12,7 @@ import numpy as np
 from er_il.arms.arm import Vector
 from sim_tasks.tasks.object_task import WIDTH, ObjectTask
 from sim_tasks.tasks.placement import Area, Placement
-from sim_tasks.tasks.rewards import Reward, proximity
+from sim_tasks.tasks.rewards import Reward, closeness
 from sim_tasks.world.crockery import teacup
 from sim_tasks.world.fixed import add_fixed
 from sim_tasks.world.props import CYLINDER
@@ -105,5 +105,5 @@ class SlideCupObstacles(ObjectTask):
             return {"reach": 1.0, "slide": 1.0}
         gap = float(np.linalg.norm(self.tip - self.push_point))
         if gap > TOUCH:
-            return {"reach": proximity(gap, WIDTH), "slide": 0.0}
-        return {"reach": 1.0, "slide": proximity(float(np.linalg.norm(self._way())), WIDTH)}
+            return {"reach": closeness(gap, WIDTH), "slide": 0.0}
+        return {"reach": 1.0, "slide": closeness(float(np.linalg.norm(self._way())), WIDTH)}

@@ -9,7 +9,7 @@ import numpy as np
 from er_il.arms.arm import Vector
 from sim_tasks.tasks.object_task import TURN_WIDTH, WIDTH, ObjectTask
 from sim_tasks.tasks.placement import Placement, yawed
-from sim_tasks.tasks.rewards import Reward, proximity
+from sim_tasks.tasks.rewards import Reward, closeness
 from sim_tasks.world.randomisation import sides, span
 from sim_tasks.world.tableware import bottle
 from sim_tasks.world.wine_rack import SEAT, WineRack
@@ -97,4 +97,4 @@ class StackWine(ObjectTask):
         if not self.grasped:
             return {"reach": self._reach(self.grasp_point), "stack": 0.0}
         distance, angle = self._errors()
-        return {"reach": 1.0, "stack": (proximity(distance, WIDTH) + proximity(angle, TURN_WIDTH)) / 2}
+        return {"reach": 1.0, "stack": (closeness(distance, WIDTH) + closeness(angle, TURN_WIDTH)) / 2}

@@ -13,7 +13,7 @@ from er_il.kinematics.redundancy import JointAngle
 from er_il.kinematics.solver import Status, kinematics_of
 from sim_tasks.tasks.object_task import TURN_WIDTH, WIDTH, ObjectTask
 from sim_tasks.tasks.placement import Area, Placement, yawed
-from sim_tasks.tasks.rewards import Reward, proximity
+from sim_tasks.tasks.rewards import Reward, closeness
 from sim_tasks.world.contact import touching
 from sim_tasks.world.fridge import Fridge
 from sim_tasks.world.props import SPHERE
@@ -131,6 +131,6 @@ class TakeBottleOutFridge(ObjectTask):
         if not self.grasped or not (self.opened or self._still()):
             return {"grasp": 0.0, "door": 0.0, "out": 0.0}
         if not self.opened:
-            return {"grasp": 1.0, "door": proximity(OPEN - self.door_angle, TURN_WIDTH), "out": 0.0}
+            return {"grasp": 1.0, "door": closeness(OPEN - self.door_angle, TURN_WIDTH), "out": 0.0}
         distance = self._distance()
-        return {"grasp": 1.0, "door": 1.0, "out": 1.0 if distance <= TAKEN else proximity(distance, WIDTH)}
+        return {"grasp": 1.0, "door": 1.0, "out": 1.0 if distance <= TAKEN else closeness(distance, WIDTH)}

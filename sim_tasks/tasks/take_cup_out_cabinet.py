@@ -8,7 +8,7 @@ import numpy as np
 from er_il.arms.arm import Vector
 from sim_tasks.tasks.object_task import WIDTH, ObjectTask, add_goal
 from sim_tasks.tasks.placement import Placement, yawed
-from sim_tasks.tasks.rewards import Reward, proximity
+from sim_tasks.tasks.rewards import Reward, closeness
 from sim_tasks.world.cupboard import Cupboard
 from sim_tasks.world.randomisation import sides, span
 from sim_tasks.world.tableware import CUP_HEIGHT, cup
@@ -92,4 +92,4 @@ class TakeCupOutCabinet(ObjectTask):
     def _progress(self) -> dict[str, float]:
         if not self.grasped:
             return {"reach": self._reach(self.grasp_point), "take": 0.0}
-        return {"reach": 1.0, "take": 1.0 if self._succeeds() else proximity(self._distance(), WIDTH)}
+        return {"reach": 1.0, "take": 1.0 if self._succeeds() else closeness(self._distance(), WIDTH)}

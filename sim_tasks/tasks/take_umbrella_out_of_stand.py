@@ -7,7 +7,7 @@ import numpy as np
 
 from sim_tasks.tasks.object_task import WIDTH, ObjectTask
 from sim_tasks.tasks.placement import Placement, yawed
-from sim_tasks.tasks.rewards import Reward, proximity
+from sim_tasks.tasks.rewards import Reward, closeness
 from sim_tasks.world.randomisation import sides, span
 from sim_tasks.world.umbrella import HANDLE_HEIGHT, UMBRELLA, UmbrellaStand
 
@@ -73,4 +73,4 @@ class TakeUmbrellaOutOfStand(ObjectTask):
     def _progress(self) -> dict[str, float]:
         if not self.grasped:
             return {"reach": self._reach(self.handle), "lift": 0.0}
-        return {"reach": 1.0, "lift": 1.0 if self._left() < NEAR else proximity(self._left(), WIDTH)}
+        return {"reach": 1.0, "lift": 1.0 if self._left() < NEAR else closeness(self._left(), WIDTH)}
