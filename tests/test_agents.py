@@ -11,6 +11,7 @@ import torch
 from acting import MODE, SMALL, TASK, homing_agent
 from documented import documented, train_in_process
 from documented import run as documented_run
+from gymnasium.spaces import Box
 from lerobot.datasets import LeRobotDataset
 from lerobot.scripts import lerobot_eval
 from safetensors.torch import load_file
@@ -146,6 +147,18 @@ def test_no_return_reaches_beyond_a_checkpoint_into_the_next_episode(trained: Ag
 
 def drawn(buffer: NStepReplayBuffer, row: int) -> list[ReplayBufferSamples]:
     return [buffer._get_samples(np.array([row])) for _ in range(10)]
+
+
+def test_critics_do_not_grow_where_no_data_is(trained: AgentTraining) -> None:
+    envs = DummyVecEnv([trained.make_env] * SMALL.environments)
+    learner = make_sac(envs, trained.make_env().observation_names, SMALL, seed=0)
+    envs.close()
+    assert isinstance(envs.observation_space, Box) and envs.observation_space.shape is not None
+    far = torch.randn(4, *envs.observation_space.shape)
+    action = torch.zeros(4, *learner.action_space.shape)  # pyright: ignore[reportGeneralTypeIssues]  a Box
+    with torch.no_grad():
+        near, beyond = (torch.cat(learner.critic(scale * far, action)) for scale in (100.0, 10_000.0))
+    assert (beyond - near).abs().max() < 0.1 * near.abs().max()  # not a hundred times as large
 
 
 def test_a_folder_belongs_to_one_training(trained: AgentTraining, tmp_path: Path) -> None:
