@@ -1,8 +1,8 @@
 """Environments for reinforcement learning: delta actions of every space in [-1, 1], decided at 10 Hz (paper V-A).
 
 In every mode a decision takes the same simulated time, and deltas count from the last command, unless asked otherwise.
-Against an obstacle the command stays ``LEAD`` before the joints: otherwise it would wind up, and as many decisions would
-be needed to take it back. An action that the arm cannot do is invalid: the arm holds, and the step earns nothing.
+Against an obstacle the command stays ``LEAD`` before the joints: otherwise it would wind up, and take as many decisions
+to be taken back. An action that the arm cannot do is invalid: the arm holds, and the step earns nothing.
 """
 
 from collections.abc import Mapping

@@ -1,7 +1,7 @@
 """The base of the paper's reinforcement-learning tasks (section V-A): things, goals and attached grasps.
 
-Contact stops the arm, but ends nothing unless a task says so; a thing that falls off the bench ends an episode. Places are
-those before a Panda; before a taller arm everything stands ``shoulder_offset`` higher.
+Contact stops the arm, but ends nothing unless a task says so; a thing that falls off the bench ends an episode. Places
+are those before a Panda; before a taller arm everything stands ``shoulder_offset`` higher.
 """
 
 from abc import abstractmethod
