@@ -23,9 +23,7 @@ from sim_tasks.world.props import BOX, SPHERE
 from sim_tasks.world.robot import TIP
 from sim_tasks.world.scene import BENCH_CENTRE, BENCH_SIZE
 
-WIDTH = (
-    0.25  # [m] of the reward's wide kernel over every distance; the paper's, 1 m wide, is flat where learning begins
-)
+WIDTH = 0.25  # [m] of the reward's wide kernel over distances; the paper's, 1 m wide, is flat where learning begins
 TURN_WIDTH = 0.5  # [rad] of that over every angle
 TIMESTEP = 0.004  # [s] of physics
 FALLEN, FELL = 0.1, "fell"  # [m] below the bench's top at which a thing has fallen off it
