@@ -125,6 +125,17 @@ def test_a_grid_of_agents_from_end_to_end(
     before = {path: path.stat().st_mtime_ns for path in out.rglob("*.json") if path.name != "benchmark.json"}
     benchmark(file, out=out, results=results)  # all is there: it is only reported again
     assert before == {path: path.stat().st_mtime_ns for path in before}
+    lost = out / "agents/reach_target/task/64-steps-seed-0-2-episodes.json"
+    lost.unlink()
+    with AgentPlan(AgentGrid.from_file(file), out.resolve()).claimed():  # as if another command worked on it
+        benchmark(file, out=out, results=tmp_path / "now", report_only=True)
+    report = json.loads((tmp_path / "now/results.json").read_text())
+    assert [cell["decoder"] for cell in report["cells"]] == ["joint"] and not lost.exists()
+    assert report["meta"]["missing"] == [{"task": "reach_target", "decoder": "task"}]
+    assert "reach_target task" in (tmp_path / "now/README.md").read_text()
+    (out / "agents/reach_target/joint/64-steps-seed-0-2-episodes.json").unlink()
+    with pytest.raises(ErIlError, match="None of the 2 cells is complete"):
+        benchmark(file, out=out, results=tmp_path / "now", report_only=True)
 
 
 def test_the_interquartile_mean_is_the_mean_of_the_middle_half() -> None:

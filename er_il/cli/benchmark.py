@@ -12,7 +12,12 @@ if TYPE_CHECKING:
 
 
 def benchmark(
-    grid: Positional[Path], *, out: Path | None = None, results: Path | None = None, ray_address: str | None = None
+    grid: Positional[Path],
+    *,
+    out: Path | None = None,
+    results: Path | None = None,
+    ray_address: str | None = None,
+    report_only: bool = False,
 ) -> None:
     """Run what a grid file asks for: trainings and rollouts of every cell, and what they need; then report.
 
@@ -25,6 +30,7 @@ def benchmark(
         results: Folder of the report; results/<name of the grid file> if omitted.
         ray_address: Address of a Ray cluster to run on, such as 10.0.0.5:6379, whose machines share the folder
             ``out``; the cores of this machine if omitted.
+        report_only: Run nothing: report the cells that are complete by now, also while another command works on others.
     """
     from rich.console import Console
 
@@ -38,6 +44,13 @@ def benchmark(
 
     folder, console = results or Path("results") / grid.stem, Console()
     check_writable(plan.out, folder)
+    if report_only:
+        plan.check()
+        from er_il.experiments.kinds import experiment_of
+        from er_il.experiments.run import report_complete
+
+        report(console, report_complete(experiment_of(plan), folder), folder)
+        return
     workplace = RayExecutor(ray_address) if ray_address else LocalExecutor(cores())
     plan.check()  # seconds of imports follow: mistakes are told before
     with workplace as executor, make_progress(console) as progress:

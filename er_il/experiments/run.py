@@ -13,6 +13,7 @@ from er_il.evaluation.results import EPISODES, RESULTS, as_csv
 from er_il.experiments.cell_plan import CellPlan
 from er_il.experiments.schedule import Executor, Job, Schedule
 from er_il.support.atomic_files import write_atomically, write_json
+from er_il.support.errors import ErIlError
 from er_il.support.provenance import provenance
 
 if TYPE_CHECKING:
@@ -80,11 +81,32 @@ def run(
         filming = experiment.films(with_films)
         recording = Schedule(chain(*filming.values()))
         _run(recording, executor, progress)
-        for task, of_task in filming.items():
-            if recording.done.issuperset(of_task):
-                experiment.show(task, of_task, folder, with_films)
-        experiment.write_pages(folder)
+        _show(experiment, filming, recording, folder, with_films)
     return Outcome(report, tuple(schedule.failed.values()), tuple(recording.failed.values()))
+
+
+def report_complete(experiment: Experiment, folder: Path) -> Outcome:
+    """Write what :func:`run` writes, of the cells that are complete by now; another command may be at work on others.
+
+    Raises:
+        ErIlError: no cell is complete.
+    """
+    plan = experiment.plan
+    if not plan.complete:
+        raise ErIlError(f"None of the {len(plan.targets)} cells is complete in {plan.out}.")
+    report = write_results(experiment, folder)
+    filming = experiment.films(False)
+    _show(experiment, filming, Schedule(chain(*filming.values())), folder, with_films=False)
+    return Outcome(report, (), ())
+
+
+def _show(
+    experiment: Experiment, filming: Mapping[str, Sequence[Job]], recording: Schedule, folder: Path, with_films: bool
+) -> None:
+    for task, of_task in filming.items():
+        if recording.done.issuperset(of_task):
+            experiment.show(task, of_task, folder, with_films)
+    experiment.write_pages(folder)
 
 
 def _run(schedule: Schedule, executor: Executor, progress: Progress, watch: Callable[[], None] = lambda: None) -> None:
