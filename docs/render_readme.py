@@ -59,7 +59,9 @@ def rendered(text: str) -> str:
     def filled(block: re.Match[str]) -> str:
         grid, study = ROOT / block[2] / RESULTS, ROOT / block[2] / "report.json"
         if grid.exists():
-            return f"{block[1]}{markdown_table(table('compact', **json.loads(grid.read_text())))}\n{block[3]}"
+            report = json.loads(grid.read_text())
+            kind = "agents" if "suite" in report else "compact"
+            return f"{block[1]}{markdown_table(table(kind, **report))}\n{block[3]}"
         return f"{block[1]}{shown(json.loads(study.read_text()))}\n{block[3]}"
 
     return BLOCK.sub(filled, text)
