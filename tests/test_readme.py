@@ -1,12 +1,13 @@
 """The pages' tables are those of the results they name, and of the tasks there are."""
 
+import json
 import runpy
 import shutil
 from pathlib import Path
 
 import pytest
 
-from er_il.report.grid_page import write_pages
+from er_il.report import agents_page, grid_page
 from sim_tasks import TASKS
 from sim_tasks.tasks.robot_task import RATE
 
@@ -37,7 +38,8 @@ def test_the_grids_pages_are_rendered_from_their_results(name: str, tmp_path: Pa
     for path in (ROOT / "results" / name).glob("*"):
         if path.suffix in (".json", ".png"):
             shutil.copy(path, tmp_path)
-    write_pages(tmp_path)
+    of_agents = "suite" in json.loads((tmp_path / "results.json").read_text())
+    (agents_page if of_agents else grid_page).write_pages(tmp_path)
     for page in ("README.md", "table.md"):
         assert (tmp_path / page).read_text() == (ROOT / "results" / name / page).read_text()
 
