@@ -13,6 +13,7 @@ from typing import Any
 
 from er_il.envs.decoders import DECODERS
 from er_il.evaluation.results import RESULTS
+from er_il.experiments.agents.grid import MODES
 from er_il.report.joints import joints_table
 from er_il.report.margins import margins_table
 from er_il.report.tables import markdown_table
@@ -60,7 +61,7 @@ def rendered(text: str) -> str:
         grid, study = ROOT / block[2] / RESULTS, ROOT / block[2] / "report.json"
         if grid.exists():
             report = json.loads(grid.read_text())
-            kind = "agents" if "suite" in report else "compact"
+            kind = "agents" if MODES in report["meta"]["grid"] else "compact"
             return f"{block[1]}{markdown_table(table(kind, **report))}\n{block[3]}"
         return f"{block[1]}{shown(json.loads(study.read_text()))}\n{block[3]}"
 

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from gymnasium.spaces import Box
 from lerobot.datasets import LeRobotDataset
 from lerobot.scripts import lerobot_eval
 from safetensors.torch import load_file
+from stable_baselines3 import SAC
 from stable_baselines3.common.buffers import NStepReplayBuffer, ReplayBufferSamples
 from stable_baselines3.common.vec_env import DummyVecEnv
 
@@ -111,9 +113,7 @@ def test_networks_see_what_is_left_to_a_goal_ten_times_as_large(trained: AgentTr
 
 
 def test_a_checkpoint_brings_everything_back(trained: AgentTraining) -> None:
-    envs = DummyVecEnv([trained.make_env] * SMALL.environments)
-    names = trained.make_env().observation_names
-    fresh = make_sac(envs, names, SMALL, seed=7)
+    fresh = untrained(trained, seed=7)
     folder = last_checkpoint(trained.out)
     assert folder is not None
     progress = load_state(folder / STATE, {"task": fresh})
@@ -125,12 +125,17 @@ def test_a_checkpoint_brings_everything_back(trained: AgentTraining) -> None:
     assert all(torch.equal(value, weights(trained)[f"actor.{key}"]) for key, value in fresh.actor.state_dict().items())
     moments = fresh.critic.optimizer.state_dict()["state"]
     assert moments and all(each["step"] == fresh._n_updates for each in moments.values())
-    envs.close()
+
+
+def untrained(training: AgentTraining, seed: int) -> SAC:
+    """SAC as a training begins with it; its environments are closed."""
+    envs = DummyVecEnv([training.make_env] * SMALL.environments)
+    with closing(envs), closing(training.make_env()) as probe:
+        return make_sac(envs, probe.observation_names, SMALL, seed)
 
 
 def test_no_return_reaches_beyond_a_checkpoint_into_the_next_episode(trained: AgentTraining) -> None:
-    envs = DummyVecEnv([trained.make_env] * SMALL.environments)
-    learner = make_sac(envs, trained.make_env().observation_names, SMALL, seed=0)
+    learner = untrained(trained, seed=0)
     folder = last_checkpoint(trained.out)
     assert folder is not None and SMALL.n_steps == 3
     load_state(folder / STATE, {"task": learner})
@@ -142,7 +147,6 @@ def test_no_return_reaches_beyond_a_checkpoint_into_the_next_episode(trained: Ag
     assert all(sample.discounts.item() == pytest.approx(discount) for sample in drawn(buffer, last))
     assert all(sample.dones.item() == 0 for sample in drawn(buffer, last))  # the critic is asked beyond it
     assert all(sample.discounts.item() == pytest.approx(discount**2) for sample in drawn(buffer, last - 1))
-    envs.close()
 
 
 def drawn(buffer: NStepReplayBuffer, row: int) -> list[ReplayBufferSamples]:
@@ -150,12 +154,10 @@ def drawn(buffer: NStepReplayBuffer, row: int) -> list[ReplayBufferSamples]:
 
 
 def test_critics_do_not_grow_where_no_data_is(trained: AgentTraining) -> None:
-    envs = DummyVecEnv([trained.make_env] * SMALL.environments)
-    learner = make_sac(envs, trained.make_env().observation_names, SMALL, seed=0)
-    envs.close()
-    assert isinstance(envs.observation_space, Box) and envs.observation_space.shape is not None
-    far = torch.randn(4, *envs.observation_space.shape)
-    action = torch.zeros(4, *learner.action_space.shape)  # pyright: ignore[reportGeneralTypeIssues]  a Box
+    learner = untrained(trained, seed=0)
+    assert isinstance(learner.observation_space, Box) and isinstance(learner.action_space, Box)
+    far = torch.randn(4, *learner.observation_space.shape)
+    action = torch.zeros(4, *learner.action_space.shape)
     with torch.no_grad():
         near, beyond = (torch.cat(learner.critic(scale * far, action)) for scale in (100.0, 10_000.0))
     assert (beyond - near).abs().max() < 0.1 * near.abs().max()  # not a hundred times as large

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from er_il.experiments.agents.grid import MODES
 from er_il.report import agents_page, grid_page
 from sim_tasks import TASKS
 from sim_tasks.tasks.robot_task import RATE
@@ -38,7 +39,7 @@ def test_the_grids_pages_are_rendered_from_their_results(name: str, tmp_path: Pa
     for path in (ROOT / "results" / name).glob("*"):
         if path.suffix in (".json", ".png"):
             shutil.copy(path, tmp_path)
-    of_agents = "suite" in json.loads((tmp_path / "results.json").read_text())
+    of_agents = MODES in json.loads((tmp_path / "results.json").read_text())["meta"]["grid"]
     (agents_page if of_agents else grid_page).write_pages(tmp_path)
     for page in ("README.md", "table.md"):
         assert (tmp_path / page).read_text() == (ROOT / "results" / name / page).read_text()

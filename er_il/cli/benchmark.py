@@ -34,7 +34,7 @@ def benchmark(
     """
     from rich.console import Console
 
-    from er_il.experiments.kinds import read_plan
+    from er_il.experiments.kinds import experiment_of, read_plan
 
     plan = read_plan(grid, (out or Path("outputs/benchmark") / grid.stem).resolve())
     from er_il.cli.progress import make_progress
@@ -44,20 +44,17 @@ def benchmark(
 
     folder, console = results or Path("results") / grid.stem, Console()
     check_writable(plan.out, folder)
+    plan.check()  # seconds of imports follow: mistakes are told before
     if report_only:
-        plan.check()
-        from er_il.experiments.kinds import experiment_of
         from er_il.experiments.run import report_complete
 
-        report(console, report_complete(experiment_of(plan), folder), folder)
-        return
-    workplace = RayExecutor(ray_address) if ray_address else LocalExecutor(cores())
-    plan.check()  # seconds of imports follow: mistakes are told before
-    with workplace as executor, make_progress(console) as progress:
-        from er_il.experiments.kinds import experiment_of
-        from er_il.experiments.run import run
+        outcome = report_complete(experiment_of(plan), folder)
+    else:
+        workplace = RayExecutor(ray_address) if ray_address else LocalExecutor(cores())
+        with workplace as executor, make_progress(console) as progress:
+            from er_il.experiments.run import run
 
-        outcome = run(experiment_of(plan), executor, progress, folder)
+            outcome = run(experiment_of(plan), executor, progress, folder)
     report(console, outcome, folder)
 
 

@@ -55,6 +55,6 @@ def replay(datasets: Positional[tuple[str, ...]], *, out: Path = Path("outputs/r
     console.print(table)
     path = out / "report.json"
     # Of a dataset's path the names that tell it, not the machine's folders before.
-    names = ["/".join(dataset.parts[-2:]) for dataset in found]
+    names = ["/".join(dataset.resolve().parts[-2:]) for dataset in found]
     write_report(cells, provenance() | {"datasets": names}, path)
     console.print(str(path), highlight=False, soft_wrap=True)

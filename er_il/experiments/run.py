@@ -81,7 +81,7 @@ def run(
         filming = experiment.films(with_films)
         recording = Schedule(chain(*filming.values()))
         _run(recording, executor, progress)
-        _show(experiment, filming, recording, folder, with_films)
+        _show(experiment, filming, folder, with_films)
     return Outcome(report, tuple(schedule.failed.values()), tuple(recording.failed.values()))
 
 
@@ -95,16 +95,14 @@ def report_complete(experiment: Experiment, folder: Path) -> Outcome:
     if not plan.complete:
         raise ErIlError(f"None of the {len(plan.targets)} cells is complete in {plan.out}.")
     report = write_results(experiment, folder)
-    filming = experiment.films(False)
-    _show(experiment, filming, Schedule(chain(*filming.values())), folder, with_films=False)
+    _show(experiment, experiment.films(False), folder, with_films=False)
     return Outcome(report, (), ())
 
 
-def _show(
-    experiment: Experiment, filming: Mapping[str, Sequence[Job]], recording: Schedule, folder: Path, with_films: bool
-) -> None:
+def _show(experiment: Experiment, filming: Mapping[str, Sequence[Job]], folder: Path, with_films: bool) -> None:
+    """Show the tasks that are filmed, and write the page."""
     for task, of_task in filming.items():
-        if recording.done.issuperset(of_task):
+        if all(job.done for job in of_task):
             experiment.show(task, of_task, folder, with_films)
     experiment.write_pages(folder)
 

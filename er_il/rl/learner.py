@@ -73,6 +73,9 @@ def make_actor(observations: gymnasium.Space[Any], actions: gymnasium.spaces.Box
 
 def _network(images: bool, layers: Sequence[int], scale: Sequence[float], shift: int) -> dict[str, Any]:
     extractor = {"features_extractor_kwargs": {"scale": scale} | ({"shift": shift} if images else {})}
-    extractor |= {"features_extractor_class": ShiftedExtractor if images else ScaledExtractor}
-    fused = {"optimizer_kwargs": {"fused": True}}  # faster, else the same Adam
-    return {"net_arch": list(layers), "activation_fn": NormedReLU} | fused | extractor
+    return extractor | {
+        "features_extractor_class": ShiftedExtractor if images else ScaledExtractor,
+        "net_arch": list(layers),
+        "activation_fn": NormedReLU,
+        "optimizer_kwargs": {"fused": True},  # faster, else the same Adam
+    }
