@@ -44,6 +44,7 @@ class Thing:
     looks: tuple[Primitive, ...]  # visual only
     touch: tuple[tuple[Primitive, float], ...]  # collision only, each with its share of the mass
     grip: Primitive | None = None  # the one of these that a hand is to take it by; any if None
+    rolling: float | None = None  # [m] rolling friction of what is not smooth and round; as good as none if None
 
     def add(self, spec: mujoco.MjSpec, name: str, position: Sequence[float]) -> mujoco.MjsBody:
         """Add the thing with a free joint of its name."""
@@ -53,7 +54,8 @@ class Thing:
             _geom(body, primitive, mass=0, contype=0, conaffinity=0, group=2)
         for primitive, share in self.touch:
             name_of = {"name": grip_name(name)} if primitive is self.grip else {}
-            solid = {"mass": share * self.mass, "friction": (1.0, 0.02, 0.0005), "condim": 4, "group": 3}
+            rolls = {"friction": (1.0, 0.02, self.rolling or 0.0005), "condim": 6 if self.rolling else 4}
+            solid = {"mass": share * self.mass, "group": 3} | rolls
             _geom(body, primitive, **solid, **name_of)
         return body
 

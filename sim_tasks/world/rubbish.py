@@ -9,7 +9,7 @@ TOMATO_RED = (0.82, 0.13, 0.08, 1.0)
 PAPER_MIDDLE = 0.028  # [m] height of the paper ball's middle
 TOMATO_MIDDLE = 0.027
 
-# Upright cylinders touch: the fingers find them alike from every side, and they do not roll away.
+# Upright cylinders touch: the fingers find them alike from every side, and standing they do not roll away.
 CRUMPLED_PAPER = Thing(
     mass=0.03,
     looks=tuple(
@@ -26,6 +26,7 @@ CRUMPLED_PAPER = Thing(
         )
     ),
     touch=((Primitive(CYLINDER, (0.028, 0.027, 0.0), (0.0, 0.0, 0.027)), 1.0),),
+    rolling=0.01,
 )
 
 TOMATO = Thing(
@@ -39,4 +40,5 @@ TOMATO = Thing(
         Primitive(CYLINDER, (0.002, 0.006, 0.0), (0.0, 0.0, 0.059), LEAF),
     ),
     touch=((Primitive(CYLINDER, (0.030, 0.026, 0.0), (0.0, 0.0, 0.026)), 1.0),),
+    rolling=0.001,
 )
