@@ -117,6 +117,24 @@ class LearnableEnv(ArmEnv, Protocol):
 
 
 @runtime_checkable
+class DirectedEnv(LearnableEnv, Protocol):
+    """A learnable environment that tells what its reward depends on, from which agents learn better than from poses.
+
+    Names are the same in every episode, whatever the task asks for in it.
+    """
+
+    @property
+    def ways(self) -> Mapping[str, Vector]:
+        """Vectors (3,) in the base frame by name, distances [m] or turns [rad]: of most, nothing is left in the end."""
+        ...
+
+    @property
+    def directions(self) -> Mapping[str, Vector]:
+        """Unit vectors (3,) in the base frame by name: axes of things."""
+        ...
+
+
+@runtime_checkable
 class ClearanceEnv(ArmEnv, Protocol):
     """An arm environment that tells how far the arm would be from the world: what no robot knows."""
 

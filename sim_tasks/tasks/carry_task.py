@@ -1,6 +1,7 @@
 """The base of the tasks in which one thing is grasped and carried to a mark."""
 
 from abc import abstractmethod
+from collections.abc import Mapping
 from typing import ClassVar
 
 import mujoco
@@ -45,6 +46,10 @@ class CarryTask(GraspTask):
 
     def _build(self, spec: mujoco.MjSpec) -> None:
         add_goal(spec, MARK, MARK_RADIUS, MARK_COLOUR)
+
+    @property
+    def ways(self) -> Mapping[str, Vector]:
+        return {self.target: self.grasp_point - self.tip, MARK: self.position(MARK) - self.grasp_point}
 
     def _lift(self) -> float:
         distance = float(np.linalg.norm(self.grasp_point - self.position(MARK)))

@@ -1,5 +1,6 @@
 """Meat Off Grill: put the asked piece of meat on the shelf at the grill's side (paper V-A)."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import mujoco
@@ -36,7 +37,7 @@ class MeatOffGrill(ReleaseTask):
     arms = ("panda", "panda8")
     grill = Grill()
     centre = (0.54, 0.06)  # x, y [m] of the grill's mean place
-    reward = Reward(reach=0.3, place=0.4, release=0.1, success=0.2)
+    reward = Reward(reach=0.25, place=0.25, release=0.25, success=0.25)
 
     def __init__(
         self,
@@ -68,6 +69,17 @@ class MeatOffGrill(ReleaseTask):
     def grasp_point(self) -> Vector:
         """Where the asked piece is taken (3,) [m]."""
         return self.point(self.asked, (0.0, 0.0, GRASP_HEIGHT))
+
+    @property
+    def ways(self) -> Mapping[str, Vector]:
+        return {
+            "meat": self.grasp_point - self.tip,
+            "shelf": self.point(GRILL, self._zone.tolist()) - self.position(self.asked),
+        }
+
+    @property
+    def directions(self) -> Mapping[str, Vector]:
+        return {GRILL: self.rotation(GRILL)[:, 0]}
 
     def _build(self, spec: mujoco.MjSpec) -> None:
         self.grill.add(spec, GRILL)

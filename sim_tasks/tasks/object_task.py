@@ -1,11 +1,12 @@
 """The base of the paper's reinforcement-learning tasks (section V-A): things, goals and attached grasps.
 
-Contact stops the arm, but ends nothing unless a task says so; a thing that falls off the bench ends an episode. Places
-are those before a Panda; before a taller arm everything stands ``shoulder_offset`` higher.
+Contact stops the arm, but ends nothing unless a task says so. A thing that falls off the bench cuts an episode short;
+an end of value 0 would teach to stay away from things. Places are those before a Panda; before a taller arm
+everything stands ``shoulder_offset`` higher.
 """
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 import mujoco
@@ -16,14 +17,14 @@ from er_il.support.errors import UnknownNameError
 from sim_tasks.tasks.arm_task import ArmTask
 from sim_tasks.tasks.placement import Placement
 from sim_tasks.tasks.rewards import closeness
-from sim_tasks.world.attachment import Attachment, add_attachments
+from sim_tasks.world.attachment import Attachment, add_attachments, is_open
 from sim_tasks.world.contact import touching
 from sim_tasks.world.grip import slow_grip
 from sim_tasks.world.props import BOX, SPHERE
 from sim_tasks.world.robot import TIP
 from sim_tasks.world.scene import BENCH_CENTRE, BENCH_SIZE
 
-WIDTH = 0.25  # [m] of the reward's wide kernel over distances; the paper's, 1 m wide, is flat where learning begins
+WIDTH = 0.25  # [m] of the reward's middle kernel over distances; the paper's only one is 1 m wide
 TURN_WIDTH = 0.5  # [rad] of that over every angle
 TIMESTEP = 0.004  # [s] of physics
 FALLEN, FELL = 0.1, "fell"  # [m] below the bench's top at which a thing has fallen off it
@@ -48,8 +49,8 @@ class ObjectTask(ArmTask):
         """Build the task.
 
         Args:
-            grip: ``attached``: what both fingers touch when they close is welded to the hand until they open;
-                ``friction``: nothing is.
+            grip: ``attached``, as in RLBench: the fingers are told to be open or closed, and what both touch when they
+                close is welded to the hand until they open; ``friction``: nothing is.
             kwargs: See :class:`ArmTask`.
 
         Raises:
@@ -58,10 +59,12 @@ class ObjectTask(ArmTask):
         if grip not in GRIPS:
             raise UnknownNameError("grip", grip, GRIPS)
         self._attaches = grip == ATTACHED
+        self.commanded_opening = 1.0  # in [0, 1], as the last action has it
         super().__init__(**kwargs)
         self._attachment = Attachment(self.model, self.graspable if self._attaches else (), self._fingers)
         self._tip = self.model.body(TIP).id
         self._ids = {name: self.model.body(name).id for name in self.objects}
+        mujoco.mj_forward(self.model, self.data)  # what is named can be measured before the first episode, too
 
     def world_spec(self) -> mujoco.MjSpec:
         spec = super().world_spec()
@@ -102,6 +105,15 @@ class ObjectTask(ArmTask):
         """True if the hand holds a thing."""
         return bool(self.held)
 
+    @property
+    @abstractmethod
+    def ways(self) -> Mapping[str, Vector]:
+        """What the reward depends on, as :class:`er_il.envs.protocol.DirectedEnv` tells it."""
+
+    @property
+    def directions(self) -> Mapping[str, Vector]:
+        return {}
+
     def position(self, name: str) -> Vector:
         """Origin of an object in the base frame (3,) [m]."""
         return self.data.xpos[self._ids[name]]
@@ -129,12 +141,18 @@ class ObjectTask(ArmTask):
             self.data.joint(name).qpos = (*raised, *quaternion)
 
     def _place(self, placement: Placement) -> None:
+        self.commanded_opening = 1.0
         self._attachment.forget()
         self._arrange(placement)
 
     @abstractmethod
     def _arrange(self, placement: Placement) -> None:
         """Put the objects at a placement by :meth:`_put`; forget the last episode."""
+
+    def _drive(self, command: Vector) -> None:
+        self.commanded_opening = float(command[-1])
+        opening = float(is_open(self.commanded_opening)) if self._attaches else self.commanded_opening
+        super()._drive(np.append(command[:-1], opening))
 
     def _grip(self, opening: float) -> None:
         self._attachment.update(self.data, opening)
@@ -143,8 +161,11 @@ class ObjectTask(ArmTask):
         return all(touching(self.model, self.data, finger, {self._ids[name]}) for finger in self._fingers)
 
     def _fails(self) -> str:
+        return ""
+
+    def _cut_short(self) -> str:
         lowest = self.shoulder_offset - FALLEN
-        return FELL if any(self.position(name)[2] < lowest for name in self.graspable) else ""
+        return FELL if any(self.position(name)[2] < lowest for name in self.graspable) else super()._cut_short()
 
     def _times_out(self) -> str:
         return "timeout"

@@ -1,10 +1,12 @@
 """Phone on Base: put a cordless phone's handset into the cradle of its base station (paper V-A)."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import mujoco
 import numpy as np
 
+from er_il.arms.arm import Vector
 from sim_tasks.tasks.object_task import WIDTH
 from sim_tasks.tasks.placement import Placement, yawed
 from sim_tasks.tasks.release_task import ReleaseTask
@@ -27,7 +29,7 @@ class PhoneOnBase(ReleaseTask):
     graspable = (PHONE,)
     station = BaseStation()
     centre, base_place = (0.45, -0.13), (0.50, 0.22)  # x, y [m] of the middles of their places
-    reward = Reward(reach=0.3, place=0.3, open=0.2, success=0.2)
+    reward = Reward(reach=0.25, place=0.25, open=0.25, success=0.25)
 
     def __init__(
         self,
@@ -85,11 +87,27 @@ class PhoneOnBase(ReleaseTask):
         turn = np.arccos(np.clip((np.sum(rest[:3, :3] * rotation) - 1) / 2, -1.0, 1.0))
         return bool(np.linalg.norm(self.position(PHONE) - rest[:3, 3]) < NEAR and turn < TILT)
 
+    @property
+    def ways(self) -> Mapping[str, Vector]:
+        ends = self._ends_left()
+        return {
+            PHONE: self.point(PHONE, GRIP) - self.tip,
+            "end_1": ends[0],
+            "end_2": ends[1],
+        }
+
+    @property
+    def directions(self) -> Mapping[str, Vector]:
+        return {PHONE: self.rotation(PHONE)[:, 0], BASE: self.rotation(BASE)[:, 0]}
+
+    def _ends_left(self) -> np.ndarray:
+        """How far the handset's ends (2, 3) [m] are from theirs in the cradle."""
+        rest = self.rest
+        return rest[:3, 3] + ENDS @ rest[:3, :3].T - (self.position(PHONE) + ENDS @ self.rotation(PHONE).T)
+
     def _left(self) -> float:
         """Mean distance [m] of the handset's ends from theirs in the cradle: to be moved and to be turned."""
-        rest = self.rest
-        ends = self.position(PHONE) + ENDS @ self.rotation(PHONE).T
-        return float(np.mean(np.linalg.norm(ends - (rest[:3, 3] + ENDS @ rest[:3, :3].T), axis=1)))
+        return float(np.mean(np.linalg.norm(self._ends_left(), axis=1)))
 
     def _progress(self) -> dict[str, float]:
         if self._in_place():

@@ -1,10 +1,12 @@
 """Pick and Lift: grasp the red block among others and bring it to a mark (paper V-A)."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import mujoco
 import numpy as np
 
+from er_il.arms.arm import Vector
 from sim_tasks.tasks.among_others import draw_among_others
 from sim_tasks.tasks.carry_task import MARK, CarryTask
 from sim_tasks.tasks.placement import Placement, yawed
@@ -59,6 +61,10 @@ class PickAndLift(CarryTask):
         self._mark_height_range = interval("mark_height_range", mark_height_range, least=BLOCK)
         self._mark_height = 0.0  # [m] in this episode
         super().__init__(**kwargs)
+
+    @property
+    def directions(self) -> Mapping[str, Vector]:
+        return {RED: self.rotation(RED)[:, 0]}
 
     def _build(self, spec: mujoco.MjSpec) -> None:
         super()._build(spec)

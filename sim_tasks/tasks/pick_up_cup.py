@@ -1,10 +1,12 @@
 """Pick Up Cup: take the red one of two cups away from its place (paper V-A)."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import mujoco
 import numpy as np
 
+from er_il.arms.arm import Vector
 from sim_tasks.tasks.among_others import draw_among_others
 from sim_tasks.tasks.carry_task import GraspTask
 from sim_tasks.tasks.object_task import WIDTH
@@ -62,6 +64,10 @@ class PickUpCup(GraspTask):
             self._put(name, (x, y, 0.0), yawed(yaw))
         x, y, _ = placement[RED]
         self._start = np.array([x, y, self.shoulder_offset])
+
+    @property
+    def ways(self) -> Mapping[str, Vector]:
+        return {RED: self.grasp_point - self.tip, "moved": self.position(RED) - self._start}
 
     def _lift(self) -> float:
         moved = float(np.linalg.norm(self.position(RED) - self._start))

@@ -1,5 +1,6 @@
 """Put Rubbish in Bin: drop a crumpled sheet of paper into a bin (paper V-A)."""
 
+from collections.abc import Mapping
 from itertools import combinations
 from typing import Any
 
@@ -35,7 +36,7 @@ class PutRubbishInBin(ReleaseTask):
     graspable = THINGS
     bin = Bin()
     centre, bin_place = (0.45, -0.14), (0.42, 0.34)  # x, y [m] of the middles of their places
-    reward = Reward(reach=0.3, carry=0.15, lower=0.15, open=0.2, success=0.2)
+    reward = Reward(reach=0.25, carry=0.125, lower=0.125, open=0.25, success=0.25)
 
     def __init__(
         self,
@@ -88,6 +89,10 @@ class PutRubbishInBin(ReleaseTask):
     def above_rim(self, height: float) -> Vector:
         """The point in the base frame (3,) [m] on the bin's axis, a height [m] above the rim."""
         return self.point(BIN, (0.0, 0.0, self.bin.height + height))
+
+    @property
+    def ways(self) -> Mapping[str, Vector]:
+        return {RUBBISH: self.rubbish - self.tip, BIN: self.above_rim(HIGH) - self.rubbish}
 
     def _in_place(self) -> bool:
         in_bin = self.rotation(BIN).T @ (self.rubbish - self.position(BIN))

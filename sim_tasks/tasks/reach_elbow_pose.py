@@ -4,7 +4,7 @@ The hand's pose leaves the elbow a circle; the green ball says where on it the e
 postures of the arm, so that hand and elbow can always be there at once.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import mujoco
@@ -114,13 +114,25 @@ class ReachElbowPose(ObjectTask):
         self._put(HAND_GOAL, (x, y, self._heights[HAND_GOAL]), (w, i, j, k))
         self._put(ELBOW_GOAL, (elbow_x, elbow_y, self._heights[ELBOW_GOAL]))
 
+    @property
+    def ways(self) -> Mapping[str, Vector]:
+        return {
+            HAND_GOAL: self.position(HAND_GOAL) - self.tip,
+            "turn": self.rotation(HAND_GOAL) @ self._turn_left(),
+            ELBOW_GOAL: self.position(ELBOW_GOAL) - self.data.xpos[self._elbow],
+        }
+
     def _hand_distance(self) -> float:
         return float(np.linalg.norm(self.tip - self.position(HAND_GOAL)))
 
+    def _turn_left(self) -> Vector:
+        """The rotation vector (3,) [rad] by which the hand is yet to turn, in the goal's frame."""
+        tip = self.data.xmat[self._tip].reshape(3, 3)
+        return Rotation.from_matrix(tip.T @ self.rotation(HAND_GOAL)).as_rotvec()
+
     def _turn(self) -> float:
         """Mean [rad] over the three axes of the turn that the hand lacks."""
-        tip = self.data.xmat[self._tip].reshape(3, 3)
-        return float(np.mean(np.abs(Rotation.from_matrix(self.rotation(HAND_GOAL).T @ tip).as_rotvec())))
+        return float(np.mean(np.abs(self._turn_left())))
 
     def _elbow_distance(self) -> float:
         return float(np.linalg.norm(self.data.xpos[self._elbow] - self.position(ELBOW_GOAL)))

@@ -1,11 +1,13 @@
 """Reach Target: bring the hand to a ball in free space (paper V-A)."""
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import mujoco
 import numpy as np
 
+from er_il.arms.arm import Vector
 from er_il.kinematics.solver import kinematics_of
 from sim_tasks.tasks.object_task import WIDTH, ObjectTask, add_goal
 from sim_tasks.tasks.placement import Placement
@@ -53,6 +55,10 @@ class ReachTarget(ObjectTask):
     def _arrange(self, placement: Placement) -> None:
         x, y, _ = placement[BALL]
         self._put(BALL, (x, y, self._height))
+
+    @property
+    def ways(self) -> Mapping[str, Vector]:
+        return {BALL: self.position(BALL) - self.tip}
 
     def _distance(self) -> float:
         return math.dist(self.tip, self.position(BALL))

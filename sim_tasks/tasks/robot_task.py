@@ -170,6 +170,10 @@ class RobotTask(gym.Env[dict[str, Any], np.ndarray], ABC):
         """Name of the failure if the robot collides with an obstacle in this state."""
         return "collision"
 
+    def _cut_short(self) -> str:
+        """Name of the failure if the episode is to be truncated in this state, empty if it goes on."""
+        return self._times_out() if self._steps >= self.max_steps else ""
+
     @abstractmethod
     def _times_out(self) -> str:
         """Name of the failure if the step limit is reached in this state."""
@@ -259,12 +263,10 @@ class RobotTask(gym.Env[dict[str, Any], np.ndarray], ABC):
         self._success_steps = self._success_steps + 1 if goal else 0
         success = self._success_steps >= self._success_steps_needed
         terminated = success or bool(failure)
-        truncated = not terminated and self._steps >= self.max_steps
-        if truncated:
-            failure = self._times_out()
+        cut = "" if terminated else self._cut_short()
         terms = self.reward.terms(self._progress(), goal)
-        info = {"is_success": success, "failure": failure, "reward_terms": terms}
-        return self.observer.observe(self.data), total(terms), terminated, truncated, info
+        info = {"is_success": success, "failure": failure or cut, "reward_terms": terms}
+        return self.observer.observe(self.data), total(terms), terminated, bool(cut), info
 
     def _collides(self) -> bool:
         if not self._obstacles:

@@ -4,6 +4,7 @@ The plants stand before the robot, as high as the forearm. While the hand crosse
 gap between them: the elbow has to swing to the other side than the hand, or the forearm sweeps a plant.
 """
 
+from collections.abc import Mapping
 from typing import Any
 
 import mujoco
@@ -93,6 +94,18 @@ class ServeCoffeeObstacles(ObjectTask):
     def grasp_point(self) -> Vector:
         """Where the tip of the hand takes the mug (3,) [m]."""
         return self.point(MUG, GRASP)
+
+    @property
+    def ways(self) -> Mapping[str, Vector]:
+        return {
+            MUG: self.grasp_point - self.tip,
+            "waypoint": WAYPOINT - self.position(MUG),
+            PLATE: self._to_plate(),
+        }
+
+    @property
+    def directions(self) -> Mapping[str, Vector]:
+        return {"mug_up": self.rotation(MUG)[:, 2], "mug_handle": self.rotation(MUG)[:, 0]}
 
     def _to_plate(self) -> Vector:
         """From the mug to where it stands on the plate (3,) [m]."""

@@ -4,6 +4,7 @@ The forearm lies in the gap of the row, between bottles as tall as itself, and t
 the shelf: the elbow has to swing to the other side than the hand, or the forearm presses on the bottles.
 """
 
+from collections.abc import Mapping
 from typing import Any
 
 import mujoco
@@ -88,6 +89,14 @@ class SlideCupObstacles(ObjectTask):
         """Where the tip of the hand pushes (3,) [m]: at the cup's right side, the mark being to its left."""
         x, y = self.position(CUP)[:2]
         return np.array([x, y - BESIDE, self._top + HEIGHT])
+
+    @property
+    def ways(self) -> Mapping[str, Vector]:
+        return {"beside": self.push_point - self.tip, MARK: np.append(self._way(), 0.0)}
+
+    @property
+    def directions(self) -> Mapping[str, Vector]:
+        return {CUP: self.rotation(CUP)[:, 2]}
 
     def _way(self) -> Vector:
         """From the cup to the mark (2,) [m]."""

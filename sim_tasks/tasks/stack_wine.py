@@ -66,6 +66,14 @@ class StackWine(ObjectTask):
         """The place of that point in the rack, in the base frame (3,) [m]."""
         return self.point(RACK, (0.0, 0.0, self.rack.height))
 
+    @property
+    def ways(self) -> Mapping[str, Vector]:
+        return {BOTTLE: self.grasp_point - self.tip, "seat": self.seat - self.grasp_point}
+
+    @property
+    def directions(self) -> Mapping[str, Vector]:
+        return {BOTTLE: self.rotation(BOTTLE)[:, 2], RACK: self.rotation(RACK)[:, 0]}
+
     def _build(self, spec: mujoco.MjSpec) -> None:
         self.rack.add(spec, RACK, "dark_wood", rail="wood")
         bottle().add(spec, BOTTLE, (*self.centres[BOTTLE], 0.0))

@@ -4,11 +4,13 @@ The hand starts at a bottle inside a fridge, whose door presses shut on the fore
 a catch, before the bottle may move; the pose of a hand that stays where it is says nothing of that.
 """
 
+from collections.abc import Mapping
 from typing import Any
 
 import mujoco
 import numpy as np
 
+from er_il.arms.arm import Vector
 from er_il.kinematics.redundancy import JointAngle
 from er_il.kinematics.solver import Status, kinematics_of
 from sim_tasks.tasks.object_task import TURN_WIDTH, WIDTH, ObjectTask
@@ -103,6 +105,18 @@ class TakeBottleOutFridge(ObjectTask):
         self.data.joint(DOOR).qpos = free
 
     @property
+    def ways(self) -> Mapping[str, Vector]:
+        return {
+            BOTTLE: self._neck - self.tip,
+            "place": self._place_of_bottle - self.position(BOTTLE),
+            "mark": self.mark - self._neck,
+        }
+
+    @property
+    def directions(self) -> Mapping[str, Vector]:
+        return {DOOR: self.rotation(DOOR)[:, 0]}
+
+    @property
     def touched(self) -> tuple[str, ...]:
         return (*super().touched, DOOR)
 
@@ -122,7 +136,11 @@ class TakeBottleOutFridge(ObjectTask):
 
     def _distance(self) -> float:
         """Distance [m] of the bottle's neck from the mark."""
-        return float(np.linalg.norm(self.point(BOTTLE, (0.0, 0.0, NECK)) - self.mark))
+        return float(np.linalg.norm(self._neck - self.mark))
+
+    @property
+    def _neck(self) -> Vector:
+        return self.point(BOTTLE, (0.0, 0.0, NECK))
 
     def _succeeds(self) -> bool:
         return self.grasped and self.opened and self._distance() <= TAKEN

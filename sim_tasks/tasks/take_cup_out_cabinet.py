@@ -1,5 +1,6 @@
 """Take Cup Out Cabinet: take a cup out of an open cabinet that stands turned before the robot (paper V-A)."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import mujoco
@@ -59,6 +60,14 @@ class TakeCupOutCabinet(ObjectTask):
     def grasp_point(self) -> Vector:
         """The middle of the cup (3,) [m]."""
         return self.point(CUP, MIDDLE)
+
+    @property
+    def ways(self) -> Mapping[str, Vector]:
+        return {CUP: self.grasp_point - self.tip, GOAL: self.position(GOAL) - self.grasp_point}
+
+    @property
+    def directions(self) -> Mapping[str, Vector]:
+        return {CABINET: self.rotation(CABINET)[:, 0]}
 
     def _build(self, spec: mujoco.MjSpec) -> None:
         self.cabinet.add(spec, CABINET)

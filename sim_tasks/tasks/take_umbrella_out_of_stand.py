@@ -1,10 +1,12 @@
 """Take Umbrella Out of Stand: lift a folded umbrella out of its stand, along its axis (paper V-A)."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import mujoco
 import numpy as np
 
+from er_il.arms.arm import Vector
 from sim_tasks.tasks.object_task import WIDTH, ObjectTask
 from sim_tasks.tasks.placement import Placement, yawed
 from sim_tasks.tasks.rewards import Reward, closeness
@@ -47,6 +49,17 @@ class TakeUmbrellaOutOfStand(ObjectTask):
     def handle(self) -> np.ndarray:
         """The middle of the handle in the base frame (3,) [m]."""
         return self.point(UMBRELLA_NAME, (0.0, 0.0, HANDLE_HEIGHT))
+
+    @property
+    def ways(self) -> Mapping[str, Vector]:
+        return {
+            "handle": self.handle - self.tip,
+            "mark": self.point(STAND, (0.0, 0.0, self.stand.height + MARK)) - self.position(UMBRELLA_NAME),
+        }
+
+    @property
+    def directions(self) -> Mapping[str, Vector]:
+        return {UMBRELLA_NAME: self.rotation(UMBRELLA_NAME)[:, 2]}
 
     def _build(self, spec: mujoco.MjSpec) -> None:
         self.stand.add(spec, STAND, "steel", rim="cobalt")

@@ -60,13 +60,13 @@ class Attachment:
 
     def update(self, data: mujoco.MjData, opening: float) -> None:
         """Attach or release, given the opening in [0, 1] that the fingers are told to have."""
-        if opening >= CLOSED:
+        if is_open(opening):
             self._release(data)
         elif not self.held:
             found = self._detected if self._was_open else self._touched
             if name := next((name for name in self._bodies if found(data, name)), ""):
                 self._attach(data, name)
-        self._was_open = opening >= CLOSED
+        self._was_open = is_open(opening)
 
     def _detected(self, data: mujoco.MjData, name: str) -> bool:
         return distance(self._model, data, (self._sensor,), self._shapes[name]) <= 0.0
@@ -92,6 +92,11 @@ class Attachment:
         if self.held:
             data.eq_active[self._bodies[self.held][1]] = 0
             self.held = ""
+
+
+def is_open(opening: float) -> bool:
+    """True if fingers told to have an opening in [0, 1] let go, false if they close."""
+    return opening >= CLOSED
 
 
 def _graspable_shapes(model: mujoco.MjModel, name: str) -> tuple[int, ...]:
