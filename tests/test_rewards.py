@@ -116,4 +116,4 @@ def test_a_reward_is_declared_with_weights_that_sum_to_one_and_success() -> None
         with pytest.raises(ValueError, match="sum to 1 and include 'success'"):
             Reward(**wrong)
     assert proximity(-0.1, 0.2) == 1.0 and proximity(0.2, 0.2) == pytest.approx(np.exp(-1))
-    assert closeness(-0.1, 0.2) == 1.0 and closeness(0.2, 0.2) == pytest.approx((np.exp(-1) + np.exp(-5)) / 2)
+    assert closeness(-0.1, 0.2) == 1.0 and closeness(0.2, 0.2) == pytest.approx(np.exp([-0.25, -1, -5]).mean())

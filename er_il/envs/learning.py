@@ -60,9 +60,10 @@ def space_name(mode: str) -> str:
 class LearningEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     """A task as reinforcement learning sees it; stock libraries need nothing else.
 
-    Action: Box [-1, 1] of the mode's dimensions, in shares of the paper's largest changes, and the gripper, which is
-    open above 0. Observation: the state as a flat Box (:class:`er_il.envs.learning_state.LearningState`), or with
-    ``pixels`` a Dict of two images (84, 84, 3) and the robot's part of the state. Reward: the task's, in [0, 1].
+    Action: Box [-1, 1] of the mode's dimensions, in shares of the paper's largest changes, and the gripper's opening
+    from closed (-1) to open (1); an attached grasp is open from 0 on. Observation: the state as a flat Box
+    (:class:`er_il.envs.learning_state.LearningState`), or with ``pixels`` a Dict of two images (84, 84, 3) and the
+    robot's part of the state. Reward: the task's, in [0, 1].
 
     An invalid action (its decoding is not OK; in joint space only what is not finite, since a joint stops at its limit)
     holds the last command for the decision's time and earns 0. Failures that the task calls irreversible terminate an
@@ -204,7 +205,7 @@ class LearningEnv(gymnasium.Env[Any, NDArray[np.float32]]):
             ValueError: what came is no vector of the mode's dimensions.
         """
         given = np.clip(named_vector("The action", action, self._names), -1.0, 1.0)
-        return np.append(given[:-1] * self._scale, given[-1] > 0.0)
+        return np.append(given[:-1] * self._scale, (given[-1] + 1.0) / 2.0)
 
     def render(self) -> Any:
         """A picture (H, W, 3) uint8 of the scene for people."""
