@@ -279,6 +279,6 @@ def test_the_state_that_an_agent_saw_is_that_of_its_environment() -> None:
     env = make_rl_env(TASK, MODE)
     env.reset(seed=5)
     change = env.change(np.array([1, -1, 0.5, 0, 0, 2, -0.1], dtype=np.float32))
-    assert change.tolist() == pytest.approx([0.05, -0.05, 0.025, 0, 0, 0.05, 0.0])
+    assert change.tolist() == pytest.approx([0.05, -0.05, 0.025, 0, 0, 0.05, 0.45])
     assert env.seen["agent_pos"][: env.world.arm.dof] == pytest.approx(env.world.joint_positions, abs=1e-6)
     env.close()

@@ -1,6 +1,7 @@
 """Stable-Baselines3's SAC with er_il's settings, and networks of an actor alone."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import gymnasium
@@ -9,6 +10,7 @@ import torch
 from stable_baselines3 import SAC
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.sac.policies import Actor, SACPolicy
+from torch.distributions import Distribution
 from torch.nn import functional
 
 from er_il.rl.pixels import ShiftedExtractor
@@ -55,6 +57,16 @@ def make_sac(envs: VecEnv, names: Sequence[str], settings: Settings, seed: int) 
         seed=seed,
         device="auto" if images else "cpu",  # small networks are slower on a GPU
     )
+
+
+@contextmanager
+def unchecked_distributions() -> Iterator[None]:
+    """Let torch take the arguments of distributions as they come: its checks are a seventh of an update's time."""
+    Distribution.set_default_validate_args(False)
+    try:
+        yield
+    finally:
+        Distribution.set_default_validate_args(__debug__)  # as torch begins
 
 
 def end_episodes(learner: SAC) -> None:

@@ -22,7 +22,7 @@ from er_il.rl.checkpoint import POLICY, STATE, last_checkpoint, load_state, save
 from er_il.rl.evaluation import roll_out
 from er_il.rl.export import make_policy, save_policy
 from er_il.rl.jailer import Jailer
-from er_il.rl.learner import end_episodes, make_sac
+from er_il.rl.learner import end_episodes, make_sac, unchecked_distributions
 from er_il.rl.milestones import Milestone, read_milestones, write_milestones
 from er_il.rl.modes import JAILER_REWARDED, has_controller, mode_of_environment
 from er_il.rl.settings import Settings
@@ -66,7 +66,7 @@ class AgentTraining:
             ErIlError: another process trains there, or the task, mode or arm is unknown.
         """
         has_controller(self.mode)  # raises if unknown
-        with work_folder(self.out), one_thread(), ExitStack() as stack:
+        with work_folder(self.out), one_thread(), unchecked_distributions(), ExitStack() as stack:
             self._claim()
             probe = stack.enter_context(closing(self.make_env()))
             if self.finished:
