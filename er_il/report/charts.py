@@ -45,7 +45,7 @@ def bar_chart(axis: Axes, data: pd.DataFrame, looks: Looks, *, stacked: bool = F
         axis.bar(rows["x"], rows["value"], 0.88 * width, rows["bottom"], **style)
         axis.errorbar(rows["x"], rows["value"], _spread(rows), fmt="none", ecolor=INK, elinewidth=1, capsize=2)
     axis.set_xticks(range(len(groups)), groups)
-    axis.margins(x=0.02)
+    axis.set_xlim(-0.5, len(groups) - 0.5)  # as wide for a group with a bar or more missing
     return data
 
 
