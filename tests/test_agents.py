@@ -103,6 +103,12 @@ def test_an_interrupted_training_goes_on_from_its_checkpoint(trained: AgentTrain
     assert [each.steps for each in replace(whole, steps=130).run()] == [64, 128, 130]
 
 
+def test_after_a_training_torch_checks_its_distributions_again(trained: AgentTraining) -> None:
+    assert trained.finished
+    with pytest.raises(ValueError, match="constraint"):
+        torch.distributions.Normal(0.0, -1.0)
+
+
 def test_networks_see_what_is_left_to_a_goal_ten_times_as_large(trained: AgentTraining) -> None:
     names = trained.make_env().observation_names
     scale = weights(trained)["actor.features_extractor.scale"]  # comes with the weights of the policy
