@@ -103,14 +103,6 @@ def test_an_interrupted_training_goes_on_from_its_checkpoint(trained: AgentTrain
     assert [each.steps for each in replace(whole, steps=130).run()] == [64, 128, 130]
 
 
-def test_noise_is_added_to_the_grippers_action_alone(trained: AgentTraining) -> None:
-    noisy, quiet = untrained(trained, seed=0), SMALL.replaced(gripper_noise=0.0)
-    assert noisy.action_noise is not None
-    drawn = np.array([noisy.action_noise() for _ in range(500)]).reshape(-1, 7)
-    assert not drawn[:, :-1].any() and drawn[:, -1].std() == pytest.approx(SMALL.gripper_noise, rel=0.1)
-    assert untrained(trained, seed=0, settings=quiet).action_noise is None
-
-
 def test_after_a_training_torch_checks_its_distributions_again(trained: AgentTraining) -> None:
     assert trained.finished
     with pytest.raises(ValueError, match="constraint"):
@@ -141,11 +133,11 @@ def test_a_checkpoint_brings_everything_back(trained: AgentTraining) -> None:
     assert moments and all(each["step"] == fresh._n_updates for each in moments.values())
 
 
-def untrained(training: AgentTraining, seed: int, settings: Settings = SMALL) -> SAC:
+def untrained(training: AgentTraining, seed: int) -> SAC:
     """SAC as a training begins with it; its environments are closed."""
     envs = DummyVecEnv([training.make_env] * SMALL.environments)
     with closing(envs), closing(training.make_env()) as probe:
-        return make_sac(envs, probe.observation_names, settings, seed)
+        return make_sac(envs, probe.observation_names, SMALL, seed)
 
 
 def test_no_return_reaches_beyond_a_checkpoint_into_the_next_episode(trained: AgentTraining) -> None:

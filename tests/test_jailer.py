@@ -74,7 +74,6 @@ class Counting(gymnasium.Env[Any, Any]):
 def test_the_controllers_transitions(rewarded: bool, tmp_path: Path) -> None:
     settings = SMALL.replaced(environments=1, reward_scale=2.0)
     envs = Jailer(DummyVecEnv([Counting]), NAMES, settings, 0, rewarded)
-    assert envs.controller.action_noise is None  # it has no gripper
     envs.controller.set_logger(configure(str(tmp_path), []))
     assert envs.action_space.shape == (7,)
     envs.reset()

@@ -42,8 +42,7 @@ class Jailer(VecEnvWrapper):
         actions = gymnasium.spaces.Box(-1.0, 1.0, (len(GOAL_NAMES) + 1,), np.float32)
         super().__init__(envs, action_space=actions)
         self._view, self._settings, self._rewarded = ControllerView(names), settings, rewarded
-        without = settings.replaced(gripper_noise=0.0)  # it moves the joints alone
-        self.controller = make_sac(_Blank.side_by_side(envs, self._view), self._view.inputs, without, seed)
+        self.controller = make_sac(_Blank.side_by_side(envs, self._view), self._view.inputs, settings, seed)
         self._states: Floats = np.empty(0, np.float32)  # (N, s) of now
         self._goals: tuple[NDArray[np.float64], Rotation] | None = None
         self._waiting: _Transitions | None = None  # until the next goals are known

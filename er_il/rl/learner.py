@@ -8,7 +8,6 @@ import gymnasium
 import numpy as np
 import torch
 from stable_baselines3 import SAC
-from stable_baselines3.common.noise import NormalActionNoise
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.sac.policies import Actor, SACPolicy
 from torch.distributions import Distribution
@@ -53,7 +52,6 @@ def make_sac(envs: VecEnv, names: Sequence[str], settings: Settings, seed: int) 
         train_freq=1,
         gradient_steps=settings.updates,
         n_steps=settings.n_steps,
-        action_noise=_gripper_noise(envs, settings.gripper_noise) if settings.gripper_noise else None,
         ent_coef=f"auto_{settings.temperature}",
         policy_kwargs=_network(images, settings.layers, state_scale(names), settings.shift),
         seed=seed,
@@ -77,13 +75,6 @@ def end_episodes(learner: SAC) -> None:
     assert buffer is not None
     last = buffer.pos - 1
     buffer.timeouts[last] = np.maximum(buffer.timeouts[last], 1.0 - buffer.dones[last])
-
-
-def _gripper_noise(envs: VecEnv, deviation: float) -> NormalActionNoise:
-    """Noise that lets fingers act otherwise where the action is near the boundary between open and closed."""
-    deviations = np.zeros(envs.action_space.shape or ())
-    deviations[-1] = deviation
-    return NormalActionNoise(np.zeros_like(deviations), deviations)
 
 
 def make_actor(observations: gymnasium.Space[Any], actions: gymnasium.spaces.Box, layers: Sequence[int]) -> Actor:

@@ -10,7 +10,6 @@ from er_il.support.resources import data_dir
 
 Count = Annotated[StrictInt, Field(ge=1)]
 Positive = Annotated[float, Field(gt=0, strict=True)]
-Deviation = Annotated[float, Field(ge=0, strict=True)]
 Share = Annotated[float, Field(gt=0, le=1, strict=True)]
 
 
@@ -42,7 +41,6 @@ class Settings(Declaration):
     n_steps: Count = 1  # decisions whose rewards an update adds up before it asks the critic; only from states
     milestone: Count  # decisions between evaluations, each with a checkpoint
     evaluations: Count  # episodes of such an evaluation
-    gripper_noise: Deviation = 0.0  # of what is added to the gripper's action, the last, while learning
     shift: Annotated[StrictInt, Field(ge=0)] = 0  # [px] of images in training
 
     @model_validator(mode="after")
