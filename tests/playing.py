@@ -1,6 +1,7 @@
 """Playing episodes."""
 
 from collections.abc import Iterable
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -13,3 +14,11 @@ def play(world: gymnasium.Env, actions: Iterable[np.ndarray]) -> str:
         if terminated or truncated:
             return info["failure"] or "success"
     return ""
+
+
+def play_on(world: gymnasium.Env, actions: Iterable[np.ndarray]) -> dict[str, Any]:
+    """What the last action told: actions go on beyond success."""
+    info: dict[str, Any] = {}
+    for action in actions:
+        info = world.step(action)[4]
+    return info

@@ -1,10 +1,9 @@
 """Take Bottle Out Fridge: the door must be opened with the bottle held still, and then stays open."""
 
-from collections.abc import Iterable
-
 import gymnasium
 import numpy as np
 import pytest
+from playing import play_on
 
 from sim_tasks.tasks.take_bottle_out_fridge import BOTTLE, OPEN, TakeBottleOutFridge
 
@@ -15,13 +14,6 @@ def make() -> TakeBottleOutFridge:
     world = gymnasium.make("sim_tasks/TakeBottleOutFridge-v0").unwrapped
     assert isinstance(world, TakeBottleOutFridge)
     return world
-
-
-def play(world: TakeBottleOutFridge, actions: Iterable[np.ndarray]) -> dict:
-    info: dict = {}
-    for action in actions:
-        info = world.step(action)[4]
-    return info
 
 
 def demonstration(world: TakeBottleOutFridge) -> np.ndarray:
@@ -37,7 +29,7 @@ def test_the_hand_starts_around_the_neck_and_the_door_leans_on_the_arm() -> None
         assert np.radians(25) < world.door_angle < np.radians(38)
         still = np.append(world.joint_positions, WIDE)
         before, bottle = world.door_angle, world.position(BOTTLE).copy()
-        info = play(world, [still] * 20)
+        info = play_on(world, [still] * 20)
         assert world.door_angle == pytest.approx(before, abs=0.03)  # nor does it push the arm away
         assert world.joint_positions == pytest.approx(still[:-1], abs=0.003)
         assert world.position(BOTTLE) == pytest.approx(bottle, abs=0.003)
@@ -54,10 +46,10 @@ def test_the_door_stays_open_once_it_was_opened_with_the_bottle_held_still() -> 
         assert world.opened == (info["reward_terms"]["door"] == 0.25)
         assert world.opened or widest < OPEN + 0.05
     assert info["is_success"]
-    play(world, [actions[-1]] * 40)
+    play_on(world, [actions[-1]] * 40)
     assert world.door_angle > OPEN - 0.01
     world.reset(seed=0)  # the next episode's door closes again
-    play(world, [np.append(world.joint_positions, WIDE)] * 20)
+    play_on(world, [np.append(world.joint_positions, WIDE)] * 20)
     assert not world.opened and world.door_angle < OPEN - 0.1
 
 
@@ -65,7 +57,7 @@ def test_a_door_opened_without_the_bottle_falls_shut_again() -> None:
     world = make()
     actions = demonstration(world)
     actions[:, -1] = WIDE
-    play(world, actions)
+    play_on(world, actions)
     assert not world.opened
     assert world.door_angle < np.radians(20)
 
@@ -74,9 +66,9 @@ def test_a_bottle_moved_before_earns_nothing_and_comes_out_in_vain() -> None:
     world = make()
     actions = demonstration(world)
     grasped = np.append(world.joint_positions, CLOSED)
-    assert play(world, [grasped] * 8)["reward_terms"]["grasp"] == 0.25
+    assert play_on(world, [grasped] * 8)["reward_terms"]["grasp"] == 0.25
     out = np.linspace(grasped, actions[-1], 60)  # past the door, which leans on the arm
-    info = play(world, [*out, *[actions[-1]] * 20])
+    info = play_on(world, [*out, *[actions[-1]] * 20])
     assert world.grasped and not world.opened
     assert sum(info["reward_terms"].values()) == 0.0 and not info["is_success"]
 
@@ -84,9 +76,9 @@ def test_a_bottle_moved_before_earns_nothing_and_comes_out_in_vain() -> None:
 def test_a_bottle_let_go_outside_is_not_taken() -> None:
     world = make()
     actions = demonstration(world)
-    assert play(world, actions)["is_success"]
+    assert play_on(world, actions)["is_success"]
     loose = np.append(actions[-1][:-1], WIDE)
     for steps in (1, 20):
-        info = play(world, [loose] * steps)
+        info = play_on(world, [loose] * steps)
         assert not world.grasped and world.opened
         assert not info["is_success"] and sum(info["reward_terms"].values()) == 0.0

@@ -5,6 +5,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
+from playing import play_on
 
 from er_il.envs.learning import make_rl_env
 from er_il.envs.protocol import DirectedEnv
@@ -29,19 +30,12 @@ def test_of_a_tasks_ways_nothing_is_left_once_the_leader_has_done_it(task: str) 
     assert isinstance(world, DirectedEnv)
     world.reset(seed=0, options={"beyond_success": True})
     before = {name: float(np.linalg.norm(way)) for name, way in world.ways.items()}
-    assert play_out(world) and max(before.values()) > LEFT
+    info = play_on(world, list(world.leader(0)))
+    assert info["is_success"] and max(before.values()) > LEFT
     after = {name: float(np.linalg.norm(way)) for name, way in world.ways.items()}
     assert after.keys() == before.keys()
     assert {name for name, left in after.items() if left > LEFT} <= STAYS.get(task, set())
     assert all(np.linalg.norm(each) == pytest.approx(1.0) for each in world.directions.values())
-
-
-def play_out(world: Any) -> bool:
-    """Let the leader do its task to the end; return whether it holds then."""
-    info: dict[str, Any] = {}
-    for action in list(world.leader(0)):
-        _, _, _, _, info = world.step(action)
-    return info["is_success"]
 
 
 @pytest.mark.parametrize("task", TASKS)
