@@ -10,7 +10,9 @@ import torch
 from gymnasium.spaces import Box
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 
-SMALL = ("dx", "dy", "dz", "left")  # endings of the names of dimensions that vanish at a goal
+from er_il.envs.learning_state import WAY_NAMES
+
+SMALL = (*WAY_NAMES, "left")  # endings of the names of dimensions that vanish at a goal
 ENLARGED = 10.0  # so that 0.1 m, and 0.1 rad, are 1
 
 
