@@ -37,7 +37,7 @@ class MeatOffGrill(ReleaseTask):
     arms = ("panda", "panda8")
     grill = Grill()
     centre = (0.54, 0.06)  # x, y [m] of the grill's mean place
-    reward = Reward(reach=0.25, place=0.25, release=0.25, success=0.25)
+    reward = Reward(reach=0.0625, place=0.25, release=0.25, success=0.4375)
 
     def __init__(
         self,

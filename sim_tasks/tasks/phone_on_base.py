@@ -29,7 +29,7 @@ class PhoneOnBase(ReleaseTask):
     graspable = (PHONE,)
     station = BaseStation()
     centre, base_place = (0.45, -0.13), (0.50, 0.22)  # x, y [m] of the middles of their places
-    reward = Reward(reach=0.25, place=0.25, open=0.25, success=0.25)
+    reward = Reward(reach=0.0625, place=0.25, open=0.25, success=0.4375)
 
     def __init__(
         self,

@@ -36,7 +36,7 @@ class PutRubbishInBin(ReleaseTask):
     graspable = THINGS
     bin = Bin()
     centre, bin_place = (0.45, -0.14), (0.42, 0.34)  # x, y [m] of the middles of their places
-    reward = Reward(reach=0.25, carry=0.125, lower=0.125, open=0.25, success=0.25)
+    reward = Reward(reach=0.0625, carry=0.25, lower=0.0625, open=0.25, success=0.375)
 
     def __init__(
         self,

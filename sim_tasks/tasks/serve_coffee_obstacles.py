@@ -45,7 +45,7 @@ class ServeCoffeeObstacles(ObjectTask):
     area = Area((0.30, 0.68), (-0.42, 0.42))
     start = (-1.64, -0.28, 1.17, -1.63, -0.04, 1.38, -0.28)  # above the mug, 9 cm clear of what is fragile
     centres = ((0.50, -0.24), (0.51, 0.225))  # x, y [m] of the middles of the places of mug and plate
-    reward = Reward(reach=0.2, upright=0.2, waypoint=0.2, serve=0.2, success=0.2)
+    reward = Reward(reach=0.0625, upright=0.0625, waypoint=0.25, serve=0.25, success=0.375)
 
     def __init__(
         self,

@@ -18,6 +18,7 @@ BOTTLE, RACK = "bottle", "rack"
 BENCH = -0.001  # [m] z of the bench's surface
 NEAR = 0.02  # [m] from its seat at which the bottle is in the rack: within the boards' scallops
 ALIGNED = 0.2  # [rad] of its axis to the place's
+NECK = 0.1  # [m] from the seat along the bottle's axis
 
 
 class StackWine(ObjectTask):
@@ -34,7 +35,7 @@ class StackWine(ObjectTask):
         RACK: (0.46, -0.22),
     }  # x, y [m] of the middle of their places
     rack_yaw = 2 * np.pi / 3  # the bottle's neck to the left and back
-    reward = Reward(reach=0.3, stack=0.5, success=0.2)
+    reward = Reward(reach=0.125, stack=0.5, success=0.375)
 
     def __init__(
         self,
@@ -68,7 +69,8 @@ class StackWine(ObjectTask):
 
     @property
     def ways(self) -> Mapping[str, Vector]:
-        return {BOTTLE: self.grasp_point - self.tip, "seat": self.seat - self.grasp_point}
+        neck, notch = self.point(BOTTLE, (0.0, 0.0, SEAT + NECK)), self.point(RACK, (NECK, 0.0, self.rack.height))
+        return {BOTTLE: self.grasp_point - self.tip, "seat": self.seat - self.grasp_point, "notch": notch - neck}
 
     @property
     def directions(self) -> Mapping[str, Vector]:

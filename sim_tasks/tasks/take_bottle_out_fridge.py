@@ -42,7 +42,7 @@ class TakeBottleOutFridge(ObjectTask):
     centre = (0.77, 0.33)  # x, y [m] of the bottle's mean place
     area = Area.around((fridge.front + fridge.depth / 2, fridge.side), (fridge.depth - 0.08, fridge.inner_width - 0.08))
     start = (0.06, 0.65, 0.40, -1.46, -0.88, 2.88, 1.50)  # the hand at the bottle, the elbow a little to the right
-    reward = Reward(grasp=0.25, door=0.25, out=0.25, success=0.25)
+    reward = Reward(grasp=0.0625, door=0.25, out=0.3125, success=0.375)
 
     def __init__(self, *, bottle_range: tuple[float, float] = (0.05, 0.04), **kwargs: Any) -> None:
         """Build the task.
