@@ -21,7 +21,7 @@ class GraspTask(ObjectTask):
 
     target: ClassVar[str]  # one of ``graspable``
     grasp_offset: ClassVar[tuple[float, float, float]]  # [m] the point between the fingers, in the target's frame
-    reward = Reward(reach=0.125, lift=0.375, success=0.5)
+    reward = Reward(reach=0.375, lift=0.375, success=0.25)
 
     @property
     def grasp_point(self) -> Vector:

@@ -45,7 +45,7 @@ class SlideCupObstacles(ObjectTask):
     start = (-1.3, -0.54, 0.77, -2.01, 0.83, 2.15, 0.02)  # the hand behind the row, the elbow to the left
     centre = (0.61, -0.06)  # x, y [m] of the middle of the cup's places
     distance = 0.17  # [m] between cup and mark on average
-    reward = Reward(reach=0.125, slide=0.375, success=0.5)
+    reward = Reward(reach=0.4, slide=0.4, success=0.2)
 
     def __init__(
         self, *, cup_range: tuple[float, float] = (0.04, 0.04), distance_range: float = 0.02, **kwargs: Any
