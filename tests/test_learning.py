@@ -173,19 +173,39 @@ def test_the_gripper_closes_below_zero_and_the_task_sees_how_far() -> None:
         assert world.data.ctrl[world.robot.gripper] == pytest.approx(fingers)  # [m]
 
 
-@pytest.mark.parametrize("task", ["put_rubbish_in_bin", "serve_coffee_obstacles"])
-def test_a_thing_that_falls_off_the_bench_cuts_an_episode_short(task: str) -> None:
+def drop_beside_the_bench(env: Any, thing: str) -> tuple[Any, ...]:
+    """The last of twenty idle steps after a thing was put beside the bench, or of fewer if the episode ends."""
+    env.reset(seed=0)
+    env.world.data.joint(thing).qpos[:3] = 0.4, 0.9, 0.1
+    for _ in range(20):
+        step = env.step(np.zeros(8, np.float32))
+        if step[3]:
+            break
+    return step
+
+
+@pytest.mark.parametrize("task", ["put_rubbish_in_bin", "serve_coffee_obstacles", "pick_and_lift", "meat_off_grill"])
+def test_what_a_task_is_about_cuts_an_episode_short_as_it_falls_off_the_bench(task: str) -> None:
     env = make_rl_env(task, "joint")
     env.reset(seed=0)
     world: Any = env.world
-    thing = world.graspable[-1]  # whichever of them
-    world.data.joint(thing).qpos[:3] = 0.4, 0.9, 0.1  # beside the bench
-    for _ in range(20):
-        state, _, terminated, truncated, info = env.step(np.zeros(8, np.float32))
-        if truncated:
-            break
+    (thing,) = world.needed
+    state, _, terminated, truncated, info = drop_beside_the_bench(env, thing)
     assert truncated and not terminated and info["failure"] == "fell"  # no end of value 0: it would teach to keep away
     assert np.abs(state).max() < 10  # before it is far away
+
+
+@pytest.mark.parametrize(
+    ("task", "thing"), [("put_rubbish_in_bin", "tomato_2"), ("pick_and_lift", "blue_block"), ("meat_off_grill", "")]
+)
+def test_other_things_may_fall(task: str, thing: str) -> None:
+    env = make_rl_env(task, "joint")
+    env.reset(seed=0)
+    world: Any = env.world
+    thing = thing or next(name for name in world.graspable if name != world.asked)
+    state, _, terminated, truncated, info = drop_beside_the_bench(env, thing)
+    assert not (terminated or truncated) and info["failure"] == ""
+    assert world.position(thing)[2] < -1.0 and np.abs(state).max() < 10  # it is not observed
 
 
 def test_an_idle_episode_is_truncated_after_the_papers_200_decisions() -> None:

@@ -24,6 +24,10 @@ class GraspTask(ObjectTask):
     reward = Reward(reach=0.375, lift=0.375, success=0.25)
 
     @property
+    def needed(self) -> tuple[str, ...]:
+        return (self.target,)
+
+    @property
     def grasp_point(self) -> Vector:
         """Where the fingers are to close, in the base frame (3,) [m]."""
         return self.point(self.target, self.grasp_offset)

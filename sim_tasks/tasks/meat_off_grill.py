@@ -66,6 +66,10 @@ class MeatOffGrill(ReleaseTask):
         self._zone = np.array([*self.grill.shelf_centre, self.grill.shelf + ZONE[2] - 0.005])  # in the grill's frame
 
     @property
+    def needed(self) -> tuple[str, ...]:
+        return (self.asked,)
+
+    @property
     def grasp_point(self) -> Vector:
         """Where the asked piece is taken (3,) [m]."""
         return self.point(self.asked, (0.0, 0.0, GRASP_HEIGHT))

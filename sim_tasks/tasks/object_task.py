@@ -1,7 +1,7 @@
 """The base of the paper's reinforcement-learning tasks (section V-A): things, goals and attached grasps.
 
-Contact stops the arm, but ends nothing unless a task says so. A thing that falls off the bench cuts an episode short;
-an end of value 0 would teach to stay away from things. Places are those before a Panda; before a taller arm
+Contact stops the arm, but ends nothing unless a task says so. The thing that a task is about cuts an episode short when
+it falls off the bench; an end of value 0 would teach to stay away from it. Other things may fall. Places are those before a Panda; before a taller arm
 everything stands ``shoulder_offset`` higher.
 """
 
@@ -89,6 +89,11 @@ class ObjectTask(ArmTask):
         return self.graspable
 
     @property
+    def needed(self) -> tuple[str, ...]:
+        """Of the things that can be taken those without which the task cannot be done."""
+        return self.graspable
+
+    @property
     def tip(self) -> Vector:
         """The point between the fingertips in the base frame (3,) [m]."""
         return self.data.xpos[self._tip]
@@ -165,7 +170,7 @@ class ObjectTask(ArmTask):
 
     def _cut_short(self) -> str:
         lowest = self.shoulder_offset - FALLEN
-        return FELL if any(self.position(name)[2] < lowest for name in self.graspable) else super()._cut_short()
+        return FELL if any(self.position(name)[2] < lowest for name in self.needed) else super()._cut_short()
 
     def _times_out(self) -> str:
         return "timeout"

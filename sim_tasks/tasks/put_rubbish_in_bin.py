@@ -82,6 +82,10 @@ class PutRubbishInBin(ReleaseTask):
             self._put(name, (x, y, 0.0), yawed(yaw))
 
     @property
+    def needed(self) -> tuple[str, ...]:
+        return (RUBBISH,)
+
+    @property
     def rubbish(self) -> Vector:
         """The rubbish's middle in the base frame (3,) [m]."""
         return self.point(RUBBISH, (0.0, 0.0, PAPER_MIDDLE))
