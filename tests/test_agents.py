@@ -31,7 +31,7 @@ from er_il.rl.checkpoint import POLICY, STATE, last_checkpoint, load_state
 from er_il.rl.controller import ControllerView
 from er_il.rl.demonstrator import AgentDemonstrator
 from er_il.rl.evaluation import roll_out
-from er_il.rl.learner import make_sac
+from er_il.rl.learner import aim, make_sac
 from er_il.rl.loading import load_agent
 from er_il.rl.pixels import shifted
 from er_il.rl.scaling import state_scale
@@ -138,6 +138,23 @@ def untrained(training: AgentTraining, seed: int) -> SAC:
     envs = DummyVecEnv([training.make_env] * SMALL.environments)
     with closing(envs), closing(training.make_env()) as probe:
         return make_sac(envs, probe.observation_names, SMALL, seed)
+
+
+def test_the_entropy_aimed_at_changes_along_a_training(
+    trained: AgentTraining, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    learner, settings = untrained(trained, seed=0), Settings(**SMALL.to_dict() | {"entropy": (-0.5, -2.5)})
+    dimension = len(trained.make_env().action_names)
+    for progress, of_a_dimension in ((0.0, -0.5), (0.25, -1.0), (1.0, -2.5)):
+        aim(learner, settings, progress)
+        assert learner.target_entropy == pytest.approx(dimension * of_a_dimension)
+    seen: list[tuple[SAC, float]] = []
+    monkeypatch.setattr("er_il.rl.training.aim", lambda learner, _, progress: seen.append((learner, progress)))
+    training(tmp_path / "both", mode="jailer").run()
+    learners = {learner for learner, _ in seen}
+    assert len(learners) == 2  # the controller's, too
+    for learner in learners:
+        assert [progress for each, progress in seen if each is learner] == [step / STEPS for step in range(0, STEPS, 2)]
 
 
 def test_no_return_reaches_beyond_a_checkpoint_into_the_next_episode(trained: AgentTraining) -> None:

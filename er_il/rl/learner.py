@@ -59,6 +59,13 @@ def make_sac(envs: VecEnv, names: Sequence[str], settings: Settings, seed: int) 
     )
 
 
+def aim(learner: SAC, settings: Settings, progress: float) -> None:
+    """Let a learner's temperature aim at the entropy that is due when a training is done to ``progress`` in [0, 1]."""
+    first, last = settings.entropy
+    assert learner.action_space.shape is not None
+    learner.target_entropy = learner.action_space.shape[0] * (first + (last - first) * progress)
+
+
 @contextmanager
 def unchecked_distributions() -> Iterator[None]:
     """Let torch take the arguments of distributions as they come: its checks are a seventh of an update's time."""

@@ -22,7 +22,7 @@ from er_il.rl.checkpoint import POLICY, STATE, last_checkpoint, load_state, save
 from er_il.rl.evaluation import roll_out
 from er_il.rl.export import make_policy, save_policy
 from er_il.rl.jailer import Jailer
-from er_il.rl.learner import end_episodes, make_sac, unchecked_distributions
+from er_il.rl.learner import aim, end_episodes, make_sac, unchecked_distributions
 from er_il.rl.milestones import Milestone, read_milestones, write_milestones
 from er_il.rl.modes import JAILER_REWARDED, has_controller, mode_of_environment
 from er_il.rl.settings import Settings
@@ -179,6 +179,8 @@ class _Run(BaseCallback):
             # New episodes, as after an interruption here: whether there was one makes no difference.
             self._seed_starts()
             self._sac._last_obs = self._environments.reset()  # pyright: ignore[reportAttributeAccessIssue]  no tuple
+        for learner in self._learners.values():
+            aim(learner, self._training.settings, self.num_timesteps / self._training.steps)
 
     def _on_training_end(self) -> None:
         if not self._milestones or self._milestones[-1].steps < self.num_timesteps:
