@@ -1,8 +1,8 @@
 """The base of the paper's reinforcement-learning tasks (section V-A): things, goals and attached grasps.
 
 Contact stops the arm, but ends nothing unless a task says so. The thing that a task is about cuts an episode short when
-it falls off the bench; an end of value 0 would teach to stay away from it. Other things may fall. Places are those before a Panda; before a taller arm
-everything stands ``shoulder_offset`` higher.
+it falls off the bench; an end of value 0 would teach to stay away from it. Other things may fall. Places are those
+before a Panda; before a taller arm everything stands ``shoulder_offset`` higher.
 """
 
 from abc import abstractmethod
