@@ -145,7 +145,7 @@ def test_the_entropy_aimed_at_changes_along_a_training(
 ) -> None:
     learner, settings = untrained(trained, seed=0), Settings(**SMALL.to_dict() | {"entropy": (-0.5, -2.5)})
     dimension = len(trained.make_env().action_names)
-    for progress, of_a_dimension in ((0.0, -0.5), (0.25, -1.0), (1.0, -2.5)):
+    for progress, of_a_dimension in ((0.0, -0.5), (0.5, -0.5), (0.75, -1.5), (1.0, -2.5)):
         aim(learner, settings, progress)
         assert learner.target_entropy == pytest.approx(dimension * of_a_dimension)
     seen: list[tuple[SAC, float]] = []

@@ -60,10 +60,13 @@ def make_sac(envs: VecEnv, names: Sequence[str], settings: Settings, seed: int) 
 
 
 def aim(learner: SAC, settings: Settings, progress: float) -> None:
-    """Let a learner's temperature aim at the entropy that is due when a training is done to ``progress`` in [0, 1]."""
+    """Let a learner's temperature aim at the entropy that is due when a training is done to ``progress`` in [0, 1].
+
+    It stays through the first half, to explore, and changes evenly in the second, to be precise.
+    """
     first, last = settings.entropy
     assert learner.action_space.shape is not None
-    learner.target_entropy = learner.action_space.shape[0] * (first + (last - first) * progress)
+    learner.target_entropy = learner.action_space.shape[0] * (first + (last - first) * max(2 * progress - 1, 0.0))
 
 
 @contextmanager
