@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 from er_il import Arm, Status
 from er_il.kinematics.arm_angle import ArmAngle
 from er_il.kinematics.redundancy import JointAngle
-from er_il.kinematics.solver import kinematics_of
+from er_il.kinematics.solver import Kinematics, kinematics_of
 from er_il.support.errors import ShapeError, UnknownNameError
 
 PANDA = Arm.preset("panda")
@@ -232,3 +232,22 @@ def test_damping_costs_nothing_where_it_is_easy_and_ends_nearer_to_what_cannot_b
             missed[kinematics] += (ik.pos_err + ik.rot_err) * (ik.status is not Status.OK)
     assert 50 >= met[KINEMATICS] >= met[undamped] >= 30
     assert missed[KINEMATICS] < 0.9 * missed[undamped]
+
+
+def test_no_bit_of_a_solution_depends_on_where_in_memory_its_program_lies():
+    arm, rng = Arm.preset("panda"), np.random.default_rng(0)
+    erj, era = JointAngle(arm, arm.redundant), ArmAngle(arm)
+    starts = arm.within_limits(arm.home + rng.uniform(-0.5, 0.5, (100, 7)))
+    ends = arm.within_limits(starts + rng.uniform(-0.06, 0.06, (100, 7)))
+    goals = [(kinematics_of(arm).fk(end), start, end) for start, end in zip(starts, ends, strict=True)]
+    found = set()
+    for _ in range(6):
+        litter = [bytearray(size) for size in rng.integers(20, 400, 20_000)]
+        del litter[::3]  # gaps, into which the next program's parts fall
+        kinematics, bits = Kinematics(arm), b""
+        for T, start, end in goals:
+            for redundancy in (erj, era):
+                bits += kinematics.solve(T, start, redundancy, redundancy.along(end[None]).ravel()).q.tobytes()
+        bits += b"".join(kinematics.solve(T, start, posture=arm.home).q.tobytes() for T, start, _ in goals[:20])
+        found.add(bits)
+    assert len(found) == 1

@@ -14,6 +14,7 @@ import placo  # pyright: ignore[reportMissingImports]
 from numpy.typing import NDArray
 
 from er_il.arms.arm import Arm, Vector
+from er_il.kinematics.task_order import in_order
 
 Array = NDArray[np.float64]
 
@@ -21,6 +22,7 @@ MIN_DAMPING = 1e-10  # [1] keeps the program strictly convex
 NO_DAMPING = 1e-12  # [1] so little more changes no step
 MAX_STEP = 0.2  # [rad] longest joint step: the linearisation is not trusted farther
 POSTURE_WEIGHT = 1e-2  # [1] weak against the pose: it acts on the null space
+TASKS = ("pose_position", "pose_orientation", "damping", "posture")  # as Placo names them
 EQUATION_WEIGHT = 1.0  # [1] a redundancy's equations, scaled to lengths, weigh as much as a position
 
 
@@ -48,19 +50,15 @@ class PoseQp:
         self._free = self._velocities[self.free]
         self._state = np.array(robot.state.q)
         self._T_world_base = np.array(robot.get_T_world_frame(arm.base_frame))
-        self._program = placo.KinematicsSolver(robot)
+        names = TASKS if posture else TASKS[:-1]
+        self._program, tasks = in_order(lambda: _tasks(robot, arm.ee_frame, posture), names)
+        self._pose, self._damping, self._posture = tasks
+        self._position, self._orientation = self._pose.position(), self._pose.orientation()
+        self._damped = 0.0  # the damping beyond the least that is configured
         self._program.mask_fbase(True)
         self._program.enable_joint_limits(True)
         for joint in held:
             self._program.mask_dof(arm.joints[joint])
-        self._pose = self._program.add_frame_task(arm.ee_frame, np.eye(4))
-        self._pose.configure("pose", "soft", 1.0, 1.0)
-        self._position, self._orientation = self._pose.position(), self._pose.orientation()
-        self._damping = self._program.add_regularization_task(MIN_DAMPING)
-        self._damped = 0.0  # the damping beyond the least that is configured
-        self._posture = self._program.add_joints_task() if posture else None
-        if self._posture is not None:
-            self._posture.configure("posture", "soft", POSTURE_WEIGHT)
         self._rows = np.zeros((2 * equations, len(self._state)))
         self._equations = None
         if equations:  # each written as two half-spaces
@@ -139,3 +137,18 @@ class PoseQp:
             self._rows[m:, self._order] = -matrix
             goal = matrix @ q + change
             self._equations.A, self._equations.b = self._rows, np.concatenate([goal, -goal])
+
+
+def _tasks(
+    robot: placo.RobotWrapper, frame: str, posture: bool
+) -> tuple[placo.KinematicsSolver, tuple[placo.FrameTask, placo.RegularizationTask, placo.JointsTask | None]]:
+    """A program with its tasks: the frame's pose, damping, and a posture if there is one."""
+    program = placo.KinematicsSolver(robot)
+    pose = program.add_frame_task(frame, np.eye(4))
+    pose.configure("pose", "soft", 1.0, 1.0)
+    damping = program.add_regularization_task(MIN_DAMPING)
+    damping.configure("damping", "soft", MIN_DAMPING)
+    joints = program.add_joints_task() if posture else None
+    if joints is not None:
+        joints.configure("posture", "soft", POSTURE_WEIGHT)
+    return program, (pose, damping, joints)

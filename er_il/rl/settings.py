@@ -32,7 +32,7 @@ class Settings(Declaration):
     discount: Share
     soft_update: Share  # of the critic's target, with each update
     temperature: Positive  # in the beginning
-    entropy: tuple[float, float] = (-1.0, -1.0)  # of each dimension of an action, aimed at in the first half and at the end
+    entropy: tuple[float, float] = (-1.0, -1.0)  # aimed at, of an action's dimension: in the first half, at the end
     warm_up: Annotated[StrictInt, Field(ge=0)]  # random decisions in the beginning
     environments: Count
     updates: Count  # with each decision of all environments
