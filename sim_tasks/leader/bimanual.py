@@ -94,7 +94,7 @@ class BimanualLeader[Task: BimanualTask](RobotLeader[Task], ABC):
             waypoints += map(np.concatenate, zip(*(line.waypoints(steps) for line in lines), strict=True))
         if not all(map(checks.is_free, waypoints)):
             raise PlanError("The way is blocked.")
-        # Solutions of IK differ in the last bits from process to process.
+        # Solutions of IK differ in the last bits from machine to machine.
         return np.array(waypoints).round(12)
 
 

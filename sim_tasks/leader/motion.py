@@ -93,7 +93,7 @@ def _desired(arm: Arm, keyframe: Keyframe, seed: Vector) -> dict[str, float]:
         desired[elbow] = keyframe.elbow
     if left := [joint for joint in arm.redundant if joint not in desired]:
         nearest = kinematics_of(arm).solve(keyframe.T_base_ee, seed, *joint_angles(arm, desired)).q
-        # Free joints differ in the last bits from process to process; rounding leads all to the same plan.
+        # Free joints differ in the last bits from machine to machine; rounding leads all to the same plan.
         desired |= {joint: round(float(nearest[arm.joints.index(joint)]), 4) for joint in left}
     return desired
 
@@ -108,7 +108,7 @@ def plan_path(arm: Arm, start: Vector, keyframes: Sequence[Keyframe], is_free: C
     for keyframe in keyframes:
         goal = solve_keyframe(arm, keyframe, waypoints[-1], is_free)
         waypoints += _straight(arm, waypoints[-1], goal, keyframe) if keyframe.straight else [goal]
-    # Solutions of IK differ in the last bits from process to process, and servos at their limits would amplify that.
+    # Solutions of IK differ in the last bits from machine to machine, and servos at their limits would amplify that.
     path = np.array(waypoints).round(12)
     for one, other in pairwise(path):
         for t in np.linspace(0, 1, max(2, int(np.max(np.abs(other - one)) / CHECK_STEP) + 1)):

@@ -101,7 +101,7 @@ class ReachElbowPose(ObjectTask):
         seed = self.nominal_start
         seed[-len(SIDE) :] = STRAIGHT + (SIDE - STRAIGHT) * (MIRROR if rng.random() < 0.5 else 1)
         ik = kinematics.solve(T_base_hand, seed + rng.uniform(-SPREAD, SPREAD, arm.dof))
-        q = ik.q.round(POSTURE_DIGITS)  # a free elbow is found a little differently from process to process
+        q = ik.q.round(POSTURE_DIGITS)  # a free elbow is found a little differently from machine to machine
         if ik.status is not Status.OK or np.any((q < arm.lower + MARGIN) | (q > arm.upper - MARGIN)):
             return None
         points = [tuple(kinematics.frame_pose(q, link)[:3, 3]) for link in (SHOULDER, ELBOW, WRIST)]

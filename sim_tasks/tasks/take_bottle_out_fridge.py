@@ -88,7 +88,7 @@ class TakeBottleOutFridge(ObjectTask):
         held = [q[arm.joints.index(joint)] for joint in arm.redundant]
         ik = kinematics_of(arm).solve(T_base_hand, q, JointAngle(arm, arm.redundant), held)
         if ik.status is Status.OK:
-            self.robot.place(self.data, ik.q.round(9), 1.0)  # its last bits differ from process to process
+            self.robot.place(self.data, ik.q.round(9), 1.0)  # its last bits differ from machine to machine
 
     def _close_door(self) -> None:
         """Let the door lean on the arm, from wide open."""

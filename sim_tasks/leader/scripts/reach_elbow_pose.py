@@ -45,5 +45,5 @@ class ReachElbowPoseLeader(Leader[ReachElbowPose]):
         elbow = kinematics.frame_pose(path[-1], ELBOW)[:3, 3]
         if np.linalg.norm(elbow - world.position(ELBOW_GOAL)) > REACHED:
             raise PlanError("No posture is known in which hand and elbow are both at their goals.")
-        # The elbow is free, and found a little differently from process to process.
+        # The elbow is free, and found a little differently from machine to machine.
         return [Segment(np.array(path).round(POSTURE_DIGITS), gripper=1.0, hold=REST)], self._draw_speed(rng)
