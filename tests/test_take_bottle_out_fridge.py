@@ -66,7 +66,7 @@ def test_a_bottle_moved_before_earns_nothing_and_comes_out_in_vain() -> None:
     world = make()
     actions = demonstration(world)
     grasped = np.append(world.joint_positions, CLOSED)
-    assert play_on(world, [grasped] * 8)["reward_terms"]["grasp"] == 0.25
+    assert play_on(world, [grasped] * 8)["reward_terms"]["grasp"] == 0.0625
     out = np.linspace(grasped, actions[-1], 60)  # past the door, which leans on the arm
     info = play_on(world, [*out, *[actions[-1]] * 20])
     assert world.grasped and not world.opened
