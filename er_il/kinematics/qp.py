@@ -22,7 +22,7 @@ MIN_DAMPING = 1e-10  # [1] keeps the program strictly convex
 NO_DAMPING = 1e-12  # [1] so little more changes no step
 MAX_STEP = 0.2  # [rad] longest joint step: the linearisation is not trusted farther
 POSTURE_WEIGHT = 1e-2  # [1] weak against the pose: it acts on the null space
-TASKS = ("pose_position", "pose_orientation", "damping", "posture")  # as Placo names them
+TASKS = ("pose_position", "pose_orientation", "regularization", "posture")  # as Placo names them
 EQUATION_WEIGHT = 1.0  # [1] a redundancy's equations, scaled to lengths, weigh as much as a position
 
 
@@ -147,7 +147,6 @@ def _tasks(
     pose = program.add_frame_task(frame, np.eye(4))
     pose.configure("pose", "soft", 1.0, 1.0)
     damping = program.add_regularization_task(MIN_DAMPING)
-    damping.configure("damping", "soft", MIN_DAMPING)
     joints = program.add_joints_task() if posture else None
     if joints is not None:
         joints.configure("posture", "soft", POSTURE_WEIGHT)

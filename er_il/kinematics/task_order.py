@@ -13,7 +13,7 @@ from typing import BinaryIO
 
 import placo  # pyright: ignore[reportMissingImports]
 
-ATTEMPTS = 200  # each of at most 24 orders is about as likely
+ATTEMPTS = 1000  # each of at most 24 orders is about as likely: a few milliseconds, as a rule
 STDOUT = 1  # file descriptor
 
 
