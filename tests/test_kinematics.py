@@ -235,19 +235,19 @@ def test_damping_costs_nothing_where_it_is_easy_and_ends_nearer_to_what_cannot_b
 
 
 def test_no_bit_of_a_solution_depends_on_where_in_memory_its_program_lies():
-    arm, rng = Arm.preset("panda"), np.random.default_rng(0)
-    erj, era = JointAngle(arm, arm.redundant), ArmAngle(arm)
-    starts = arm.within_limits(arm.home + rng.uniform(-0.5, 0.5, (100, 7)))
-    ends = arm.within_limits(starts + rng.uniform(-0.06, 0.06, (100, 7)))
-    goals = [(kinematics_of(arm).fk(end), start, end) for start, end in zip(starts, ends, strict=True)]
+    rng = np.random.default_rng(0)
+    redundancies = JointAngle(PANDA, PANDA.redundant), ArmAngle(PANDA)
+    starts = PANDA.within_limits(PANDA.home + rng.uniform(-0.5, 0.5, (100, 7)))
+    ends = PANDA.within_limits(starts + rng.uniform(-0.06, 0.06, (100, 7)))
+    goals = [(KINEMATICS.fk(end), start, end) for start, end in zip(starts, ends, strict=True)]
     found = set()
     for _ in range(6):
         litter = [bytearray(size) for size in rng.integers(20, 400, 20_000)]
         del litter[::3]  # gaps, into which the next program's parts fall
-        kinematics, bits = Kinematics(arm), b""
+        kinematics, bits = Kinematics(PANDA), b""
         for T, start, end in goals:
-            for redundancy in (erj, era):
+            for redundancy in redundancies:
                 bits += kinematics.solve(T, start, redundancy, redundancy.along(end[None]).ravel()).q.tobytes()
-        bits += b"".join(kinematics.solve(T, start, posture=arm.home).q.tobytes() for T, start, _ in goals[:20])
+        bits += b"".join(kinematics.solve(T, start, posture=PANDA.home).q.tobytes() for T, start, _ in goals[:20])
         found.add(bits)
     assert len(found) == 1
