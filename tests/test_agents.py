@@ -172,6 +172,21 @@ def test_no_return_reaches_beyond_a_checkpoint_into_the_next_episode(trained: Ag
     assert all(sample.discounts.item() == pytest.approx(discount**2) for sample in drawn(buffer, last - 1))
 
 
+def test_episodes_to_learn_from_are_shorter_than_those_to_be_judged(tmp_path: Path) -> None:
+    short = replace(training(tmp_path / "agent"), settings=SMALL.replaced(episode=5))
+    short.run()
+    folder, learner = last_checkpoint(short.out), untrained(short, seed=0)
+    assert folder is not None
+    load_state(folder / STATE, {"task": learner})
+    buffer = learner.replay_buffer
+    assert buffer is not None
+    ends = np.arange(4, SMALL.milestone // SMALL.environments, 5)
+    assert buffer.dones[ends].all() and buffer.timeouts[ends].all()  # the critic is asked what would follow
+    with closing(short.make_env()) as judged:
+        judged.reset(seed=0)
+        assert not any(judged.step(np.zeros(7, np.float32))[3] for _ in range(10))
+
+
 def drawn(buffer: NStepReplayBuffer, row: int) -> list[ReplayBufferSamples]:
     return [buffer._get_samples(np.array([row])) for _ in range(10)]
 

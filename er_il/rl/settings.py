@@ -35,6 +35,7 @@ class Settings(Declaration):
     entropy: tuple[float, float] = (-1.0, -1.0)  # aimed at, of an action's dimension: in the first half, at the end
     warm_up: Annotated[StrictInt, Field(ge=0)]  # random decisions in the beginning
     environments: Count
+    episode: Count  # decisions of one to learn from; to be judged, an agent has the task's time
     updates: Count  # with each decision of all environments
     buffer: Count  # transitions
     layers: Annotated[tuple[Count, ...], Field(min_length=1)]  # widths, of actor and critics alike

@@ -10,6 +10,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import gymnasium
+from gymnasium.wrappers import TimeLimit
 from stable_baselines3 import SAC
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
@@ -71,14 +73,17 @@ class AgentTraining:
             probe = stack.enter_context(closing(self.make_env()))
             if self.finished:
                 return self.milestones
-            envs = DummyVecEnv([self.make_env] * self.settings.environments)
+            envs = DummyVecEnv([self._make_lessons] * self.settings.environments)
             stack.enter_context(closing(envs))
             return _Run(self, probe, envs, advance).learn()
 
     def make_env(self, **more: Any) -> LearningEnv:
-        """An environment to learn in, or to be evaluated in; with more settings if wanted (:class:`LearningEnv`)."""
+        """An environment of its task and mode; with more settings if wanted (:class:`LearningEnv`)."""
         mode = mode_of_environment(self.mode)
         return make_rl_env(self.task, mode, pixels=self.pixels, arm=self.arm, **self.environment, **more)
+
+    def _make_lessons(self) -> gymnasium.Env[Any, Any]:
+        return TimeLimit(self.make_env(), self.settings.episode)
 
     @property
     def finished(self) -> bool:
