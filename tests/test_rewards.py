@@ -9,7 +9,7 @@ import pytest
 
 import sim_tasks
 from sim_tasks.tasks.arm_task import ArmTask
-from sim_tasks.tasks.rewards import Reward, closeness, proximity
+from sim_tasks.tasks.rewards import Reward, closeness, proximity, way_down
 
 IDS = [entry.id for entry in (*sim_tasks.TASKS, *sim_tasks.RL_TASKS)]
 SEEDS = (0, 1000, 1_000_000)
@@ -117,3 +117,17 @@ def test_a_reward_is_declared_with_weights_that_sum_to_one_and_success() -> None
             Reward(**wrong)
     assert proximity(-0.1, 0.2) == 1.0 and proximity(0.2, 0.2) == pytest.approx(np.exp(-1))
     assert closeness(-0.1, 0.2) == 1.0 and closeness(0.2, 0.2) == pytest.approx(np.exp([-0.25, -1, -5]).mean())
+
+
+def test_the_way_down_to_a_place_leads_over_its_edge() -> None:
+    def way(across: float, above: float) -> float:
+        return way_down(np.array([0.6 * across, -0.8 * across, -above]))
+
+    assert way(0.0, 0.0) == 0.0
+    assert way(0.0, 0.3) == pytest.approx(0.3)  # straight above: down
+    assert way(0.05, 0.05) == pytest.approx(0.05) and way(0.4, 0.1) == pytest.approx(
+        0.4
+    )  # along the cone, and beyond it
+    assert way(0.4, -0.05) == pytest.approx(0.55)  # on the bench, lower than the place: first up
+    assert way(0.05, 0.0) > way(0.05, 0.04)  # against the furniture under the place: up, too
+    assert way(0.02, 0.0) == pytest.approx(0.04)  # never shorter than the straight way

@@ -10,7 +10,7 @@ from er_il.arms.arm import Vector
 from sim_tasks.tasks.object_task import WIDTH
 from sim_tasks.tasks.placement import Placement, yawed
 from sim_tasks.tasks.release_task import ReleaseTask
-from sim_tasks.tasks.rewards import Reward, closeness
+from sim_tasks.tasks.rewards import Reward, closeness, way_down
 from sim_tasks.world.phone import HANDSET, LENGTH, BaseStation
 from sim_tasks.world.randomisation import sides, span
 
@@ -106,8 +106,8 @@ class PhoneOnBase(ReleaseTask):
         return rest[:3, 3] + ENDS @ rest[:3, :3].T - (self.position(PHONE) + ENDS @ self.rotation(PHONE).T)
 
     def _left(self) -> float:
-        """Mean distance [m] of the handset's ends from theirs in the cradle: to be moved and to be turned."""
-        return float(np.mean(np.linalg.norm(self._ends_left(), axis=1)))
+        """Mean way [m] of the handset's ends to theirs in the cradle: to be moved and to be turned."""
+        return float(np.mean([way_down(left) for left in self._ends_left()]))
 
     def _progress(self) -> dict[str, float]:
         if self._in_place():

@@ -3,8 +3,11 @@
 import math
 from collections.abc import Mapping
 
+from er_il.arms.arm import Vector
+
 SUCCESS = "success"
 KERNELS = (4.0, 1.0, 0.2)  # widths of closeness, in parts of its own
+CLEARANCE = 0.1  # [m] above a place, from which a thing comes down to it
 
 
 class Reward:
@@ -43,3 +46,13 @@ def closeness(distance: float, width: float) -> float:
     of the last centimetres, which decide a grasp, or of the way across the bench.
     """
     return math.fsum(proximity(distance, width * share) for share in KERNELS) / len(KERNELS)
+
+
+def way_down(left: Vector) -> float:
+    """Length [m] of the way to a place that a thing comes to from above, given the vector to it (3,) [m].
+
+    Across, and up or down to a cone over the place, which rises by 45 degrees up to ``CLEARANCE``. Along a straight way
+    a thing on the bench would be pressed against the furniture that the place is on.
+    """
+    across = math.hypot(left[0], left[1])
+    return across + abs(-left[2] - min(across, CLEARANCE))

@@ -9,7 +9,7 @@ import numpy as np
 from er_il.arms.arm import Vector
 from sim_tasks.tasks.object_task import TURN_WIDTH, WIDTH, ObjectTask
 from sim_tasks.tasks.placement import Placement, yawed
-from sim_tasks.tasks.rewards import Reward, closeness
+from sim_tasks.tasks.rewards import Reward, closeness, way_down
 from sim_tasks.world.randomisation import sides, span
 from sim_tasks.world.tableware import bottle
 from sim_tasks.world.wine_rack import SEAT, WineRack
@@ -106,5 +106,5 @@ class StackWine(ObjectTask):
             return {"reach": 1.0, "stack": 1.0}
         if not self.grasped:
             return {"reach": self._reach(self.grasp_point), "stack": 0.0}
-        distance, angle = self._errors()
-        return {"reach": 1.0, "stack": (closeness(distance, WIDTH) + closeness(angle, TURN_WIDTH)) / 2}
+        way, angle = way_down(self.seat - self.grasp_point), self._errors()[1]
+        return {"reach": 1.0, "stack": (closeness(way, WIDTH) + closeness(angle, TURN_WIDTH)) / 2}
