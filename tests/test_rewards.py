@@ -125,9 +125,7 @@ def test_the_way_down_to_a_place_leads_over_its_edge() -> None:
 
     assert way(0.0, 0.0) == 0.0
     assert way(0.0, 0.3) == pytest.approx(0.3)  # straight above: down
-    assert way(0.05, 0.05) == pytest.approx(0.05) and way(0.4, 0.1) == pytest.approx(
-        0.4
-    )  # along the cone, and beyond it
+    assert way(0.05, 0.05) == pytest.approx(0.05) and way(0.4, 0.1) == pytest.approx(0.4)  # the cone, and beyond
     assert way(0.4, -0.05) == pytest.approx(0.55)  # on the bench, lower than the place: first up
     assert way(0.05, 0.0) > way(0.05, 0.04)  # against the furniture under the place: up, too
     assert way(0.02, 0.0) == pytest.approx(0.04)  # never shorter than the straight way
