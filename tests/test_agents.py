@@ -213,6 +213,9 @@ def test_a_folder_belongs_to_one_training(trained: AgentTraining, tmp_path: Path
         SMALL.replaced(buffer=8)
     with pytest.raises(SettingsError, match="learning_rat"):
         Settings.from_dict(SMALL.to_dict() | {"learning_rat": 1.0})
+    for value in (float("nan"), -float("inf")):
+        with pytest.raises(SettingsError, match=r"entropy\.0 is .*: Input should be a finite number"):
+            SMALL.replaced(entropy=(value, -1.0))
 
 
 @pytest.mark.parametrize("name", ["task.pt", "task.npz", "progress.json", "random.pt"])

@@ -17,7 +17,7 @@ MOST_MISTAKES = 5  # that are listed
 class Declaration(BaseModel):
     """Values that a person writes into a YAML file: immutable, no key but the declared ones, no silent conversion."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     noun: ClassVar[str]  # for people, such as "recipe"
     error: ClassVar[type[ErIlError]]  # of values that are no such declaration
