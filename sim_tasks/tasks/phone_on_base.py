@@ -11,13 +11,13 @@ from sim_tasks.tasks.object_task import WIDTH
 from sim_tasks.tasks.placement import Placement, yawed
 from sim_tasks.tasks.release_task import ReleaseTask
 from sim_tasks.tasks.rewards import Reward, closeness, way_down
-from sim_tasks.world.phone import HANDSET, LENGTH, BaseStation
+from sim_tasks.world.phone import HANDSET, BaseStation
 from sim_tasks.world.randomisation import sides, span
 
 PHONE, BASE = "phone", "base"
 GRIP = (0.0, 0.0, 0.020)  # [m] where the fingers take the handset, in its frame
 NEAR, TILT = 0.02, np.radians(15)  # [m], [rad] from its place within which the handset is on the base
-ENDS = np.array([[-LENGTH / 2, 0.0, 0.0], [LENGTH / 2, 0.0, 0.0]])  # [m] in the handset's frame
+CORNERS = 0.2 * np.array([(1.0, 0.0, 0.0), (-0.5, 0.866, 0.0), (-0.5, -0.866, 0.0)])  # [m] in its frame, around it
 
 
 class PhoneOnBase(ReleaseTask):
@@ -89,25 +89,21 @@ class PhoneOnBase(ReleaseTask):
 
     @property
     def ways(self) -> Mapping[str, Vector]:
-        ends = self._ends_left()
-        return {
-            PHONE: self.point(PHONE, GRIP) - self.tip,
-            "end_1": ends[0],
-            "end_2": ends[1],
-        }
+        corners = {f"corner_{number}": left for number, left in enumerate(self._corners_left(), 1)}
+        return {PHONE: self.point(PHONE, GRIP) - self.tip} | corners
 
     @property
     def directions(self) -> Mapping[str, Vector]:
         return {PHONE: self.rotation(PHONE)[:, 0], BASE: self.rotation(BASE)[:, 0]}
 
-    def _ends_left(self) -> np.ndarray:
-        """How far the handset's ends (2, 3) [m] are from theirs in the cradle."""
+    def _corners_left(self) -> np.ndarray:
+        """How far the corners (3, 3) [m] of a triangle around the handset are from where they are in the cradle."""
         rest = self.rest
-        return rest[:3, 3] + ENDS @ rest[:3, :3].T - (self.position(PHONE) + ENDS @ self.rotation(PHONE).T)
+        return rest[:3, 3] + CORNERS @ rest[:3, :3].T - (self.position(PHONE) + CORNERS @ self.rotation(PHONE).T)
 
     def _left(self) -> float:
-        """Mean way [m] of the handset's ends to theirs in the cradle: to be moved and to be turned."""
-        return float(np.mean([way_down(left) for left in self._ends_left()]))
+        """Mean way [m] of these corners: to be moved and to be turned."""
+        return float(np.mean([way_down(left) for left in self._corners_left()]))
 
     def _progress(self) -> dict[str, float]:
         if self._in_place():
