@@ -29,7 +29,7 @@ class TakeUmbrellaOutOfStand(ObjectTask):
     start = (0.0, -1.17, 0.0, -2.68, 0.0, 2.03, np.pi / 4)  # the hand looks forward and down, before the umbrella
     stand = UmbrellaStand()
     centre = (0.50, 0.0)  # x, y [m] of the middle of the stand's places
-    reward = Reward(reach=0.4, lift=0.4, success=0.2)
+    reward = Reward(reach=0.125, lift=0.5, success=0.375)
 
     def __init__(
         self, *, stand_range: tuple[float, float] = (0.20, 0.40), yaw_range: float = 0.7854, **kwargs: Any
