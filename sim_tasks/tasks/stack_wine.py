@@ -94,8 +94,12 @@ class StackWine(ObjectTask):
 
     def _errors(self) -> tuple[float, float]:
         """How far the bottle is from lying in the rack: distance [m] and angle of its axis [rad]."""
+        return float(np.linalg.norm(self.grasp_point - self.seat)), self._angle()
+
+    def _angle(self) -> float:
+        """Angle [rad] of the bottle's axis to that of the place."""
         cosine = float(self.rotation(BOTTLE)[:, 2] @ self.rotation(RACK)[:, 0])
-        return float(np.linalg.norm(self.grasp_point - self.seat)), float(np.arccos(np.clip(cosine, -1.0, 1.0)))
+        return float(np.arccos(np.clip(cosine, -1.0, 1.0)))
 
     def _succeeds(self) -> bool:
         distance, angle = self._errors()
@@ -106,5 +110,5 @@ class StackWine(ObjectTask):
             return {"reach": 1.0, "stack": 1.0}
         if not self.grasped:
             return {"reach": self._reach(self.grasp_point), "stack": 0.0}
-        way, angle = way_down(self.seat - self.grasp_point), self._errors()[1]
-        return {"reach": 1.0, "stack": (closeness(way, WIDTH) + closeness(angle, TURN_WIDTH)) / 2}
+        way = way_down(self.seat - self.grasp_point)
+        return {"reach": 1.0, "stack": (closeness(way, WIDTH) + closeness(self._angle(), TURN_WIDTH)) / 2}
