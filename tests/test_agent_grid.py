@@ -125,6 +125,7 @@ def test_a_grid_of_agents_from_end_to_end(
     before = {path: path.stat().st_mtime_ns for path in out.rglob("*.json") if path.name != "benchmark.json"}
     benchmark(file, out=out, results=results)  # all is there: it is only reported again
     assert before == {path: path.stat().st_mtime_ns for path in before}
+    lost_report = (results / "results.json").read_text()
     lost = out / "agents/reach_target/task/64-steps-seed-0-2-episodes.json"
     lost.unlink()
     with AgentPlan(AgentGrid.from_file(file), out.resolve()).claimed():  # as if another command worked on it
@@ -133,9 +134,72 @@ def test_a_grid_of_agents_from_end_to_end(
     assert [cell["decoder"] for cell in report["cells"]] == ["joint"] and not lost.exists()
     assert report["meta"]["missing"] == [{"task": "reach_target", "decoder": "task"}]
     assert "reach_target task" in (tmp_path / "now/README.md").read_text()
+    add_the_cells_of_another_folder(file, tmp_path / "elsewhere", tmp_path / "now", json.loads(lost_report))
     (out / "agents/reach_target/joint/64-steps-seed-0-2-episodes.json").unlink()
     with pytest.raises(ErIlError, match="None of the 2 cells is complete"):
         benchmark(file, out=out, results=tmp_path / "now", report_only=True)
+
+
+def add_the_cells_of_another_folder(file: Path, out: Path, results: Path, all_here: Any) -> None:
+    """A report without a cell gets it from a folder that has no other, and is the report of all in one folder."""
+    published = json.loads((results / "results.json").read_text())
+    benchmark(file, out=out, results=results, add=True)
+    assert [path.name for path in (out / "agents/reach_target").iterdir()] == ["task"]  # the other was not run again
+    report = json.loads((results / "results.json").read_text())
+    assert report["cells"][0] == published["cells"][0] and report["meta"]["missing"] == []
+    measured = {"decode_p50_ms", "decode_p99_ms", "costs"}
+    for ours, theirs in zip(report["cells"], all_here["cells"], strict=True):
+        assert {key: ours[key] for key in ours.keys() - measured} == {
+            key: theirs[key] for key in theirs.keys() - measured
+        }
+    assert "difference_to_joint" in report["cells"][1] and report["suite"] == all_here["suite"]
+    assert report["meta"]["costs"]["trainings"] == 2
+    rows = gzip.decompress((results / "episodes.csv.gz").read_bytes())
+    benchmark(file, out=out, results=results, add=True)  # the same again
+    assert rows == gzip.decompress((results / "episodes.csv.gz").read_bytes()) and rows.count(b"\n") == 5
+    benchmark(file, out=out, results=results)  # what the folder itself lacks is run, and the report is of it alone
+    assert len(list((out / "agents/reach_target").iterdir())) == 2
+
+
+def test_a_report_that_cells_cannot_be_added_to_is_named(tmp_path: Path) -> None:
+    file, results = tmp_path / "grid.yaml", tmp_path / "results"
+    file.write_text(yaml.safe_dump(TINY))
+    assert isinstance(plan := read_plan(file, tmp_path / "out", results), AgentPlan)  # of nothing so far
+    assert len(plan.jobs) == 2
+    curve = {"steps": [64], "episodes": 1, "successes": [[0]], "invalid_rates": [[0.0]]}
+    cell = {"task": "reach_target", "decoder": "task", "episodes": 2, "per_seed": [], "curve": curve}
+    meta = {"grid": grid().to_dict(), "settings": Settings.shipped(pixels=False).to_dict(), "computed_by": ["1f76b9b"]}
+
+    def publish(rows: str, cell: dict[str, Any] = cell, **changes: Any) -> None:
+        results.mkdir(exist_ok=True)
+        (results / "results.json").write_text(json.dumps({"meta": meta | changes, "cells": [cell]}))
+        (results / "episodes.csv.gz").write_bytes(gzip.compress(rows.encode()))
+
+    head, row = "task,decoder,training_seed,seed,success,failure\n", "reach_target,task,0,{},1,\n"
+    publish(head + row.format(1000) + row.format(1001))
+    assert isinstance(plan := read_plan(file, tmp_path / "out", results), AgentPlan)
+    assert [job.needs[0].mode for job in plan.jobs] == ["joint"]
+    assert plan.published.reports[AgentCell("reach_target", "task")]["computed_by"] == ["1f76b9b"]
+    for changed in ({"tasks": {"reach_target": 65}}, {"training_seeds": [1]}, {"episodes": 3}):  # asked for otherwise
+        file.write_text(yaml.safe_dump(TINY | changed))
+        assert isinstance(plan := read_plan(file, tmp_path / "out", results), AgentPlan)
+        assert not plan.published.reports and len(plan.jobs) == 2
+    file.write_text(yaml.safe_dump(TINY))
+    publish(head + row.format(1000))
+    with pytest.raises(ErIlError, match="does not hold the episodes of reach_target task"):
+        read_plan(file, tmp_path / "out", results)
+    publish(head, {})
+    with pytest.raises(ErIlError, match=r"results\.json is damaged"):
+        read_plan(file, tmp_path / "out", results)
+    publish(head, settings=SMALL.to_dict())
+    with pytest.raises(ErIlError, match="learnt with other settings"):
+        read_plan(file, tmp_path / "out", results)
+    publish(head)
+    (results / "episodes.csv.gz").write_text("no archive")
+    with pytest.raises(ErIlError, match=r"episodes\.csv\.gz is missing or damaged"):
+        read_plan(file, tmp_path / "out", results)
+    with pytest.raises(GridError, match="not a grid of agents"):
+        read_plan(data_dir("configs") / "table1.yaml", tmp_path / "out", results)
 
 
 def test_the_interquartile_mean_is_the_mean_of_the_middle_half() -> None:

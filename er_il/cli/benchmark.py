@@ -18,6 +18,7 @@ def benchmark(
     results: Path | None = None,
     ray_address: str | None = None,
     report_only: bool = False,
+    add: bool = False,
 ) -> None:
     """Run what a grid file asks for: trainings and rollouts of every cell, and what they need; then report.
 
@@ -31,18 +32,20 @@ def benchmark(
         ray_address: Address of a Ray cluster to run on, such as 10.0.0.5:6379, whose machines share the folder
             ``out``; the cores of this machine if omitted.
         report_only: Run nothing: report the cells that are complete by now, also while another command works on others.
+        add: Add to the report in ``results``: its cells are neither run nor dropped, unless ``out`` has them. For grids
+            of agents that are run part by part, or on several machines.
     """
     from rich.console import Console
 
     from er_il.experiments.kinds import experiment_of, read_plan
 
-    plan = read_plan(grid, (out or Path("outputs/benchmark") / grid.stem).resolve())
+    folder, console = results or Path("results") / grid.stem, Console()
+    plan = read_plan(grid, (out or Path("outputs/benchmark") / grid.stem).resolve(), folder if add else None)
     from er_il.cli.progress import make_progress
     from er_il.experiments.cluster import RayExecutor
     from er_il.support.atomic_files import check_writable
     from er_il.support.workers import LocalExecutor, cores
 
-    folder, console = results or Path("results") / grid.stem, Console()
     check_writable(plan.out, folder)
     plan.check()  # seconds of imports follow: mistakes are told before
     if report_only:

@@ -121,8 +121,6 @@ def report_cells(rollouts: pd.DataFrame, cell_of: Sequence[str] = ()) -> list[di
             :data:`CELL`, and :data:`WITHIN` where it is, if empty.
     """
     cell_of = cell_of or [name for name in (*CELL, WITHIN) if name in rollouts]
-    matched = [*(column for column in cell_of if column != "decoder"), "training_seed", "seed"]
-    reference = rollouts.loc[rollouts["decoder"] == REFERENCE, [*matched, "success"]]
     cells = []
     for key, cell in rollouts.groupby(list(cell_of), sort=False):
         labels = dict(zip(cell_of, _labels(key), strict=True))
@@ -133,12 +131,25 @@ def report_cells(rollouts: pd.DataFrame, cell_of: Sequence[str] = ()) -> list[di
             {"training_seed": int(str(seed))} | {name: each[name] for name in ("successes", "episodes", "interval")}
             for seed, each in per_seed.items()
         ]
-        paired = cell.merge(reference, on=matched, suffixes=("", "_theirs"))
-        if labels["decoder"] != REFERENCE and len(paired):
-            difference, low, high = paired_difference(paired["success"].tolist(), paired["success_theirs"].tolist())
-            report[f"difference_to_{REFERENCE}"] = {"difference": difference, "interval": [low, high]}
-        cells.append(report)
+        cells.append(report | difference_to_reference(cell, cell_of, rollouts))
     return cells
+
+
+def difference_to_reference(cell: pd.DataFrame, cell_of: Sequence[str], among: pd.DataFrame) -> dict[str, Any]:
+    """Return the paired difference of a cell to :data:`REFERENCE` by its key in reports; nothing where none is there.
+
+    Args:
+        cell: Rollouts of one cell.
+        cell_of: The columns that tell cells apart.
+        among: Rollouts with those of the reference.
+    """
+    matched = [*(column for column in cell_of if column != "decoder"), "training_seed", "seed"]
+    reference = among.loc[among["decoder"] == REFERENCE, [*matched, "success"]]
+    paired = cell.merge(reference, on=matched, suffixes=("", "_theirs"))
+    if (cell["decoder"] == REFERENCE).all() or not len(paired):
+        return {}
+    difference, low, high = paired_difference(paired["success"].tolist(), paired["success_theirs"].tolist())
+    return {f"difference_to_{REFERENCE}": {"difference": difference, "interval": [low, high]}}
 
 
 def _labels(key: Hashable) -> tuple[Any, ...]:

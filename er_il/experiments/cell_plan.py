@@ -114,18 +114,16 @@ class CellPlan[G: SeededGrid[Any], C: LabelledCell, J: RolloutJob](ABC):
         trainings = {job.needs[0] for job in self.jobs}
         return [read_json(training.path, ErIlError) for training in trainings if training.done]
 
-    def account(self, trained: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-        """Return as JSON by what results were computed, what they cost, and which cells are missing.
-
-        Args:
-            trained: Notes on the trainings, as :meth:`trained` gives.
+    def account(self, *cells: C) -> dict[str, Any]:
+        """Return as JSON which code computed the results of cells so far, or of all if none is named, and their cost.
 
         Raises:
             ErIlError: the result of a job is damaged.
         """
         from er_il.evaluation.results import load_notes  # pandas, too
 
-        complete, done = self.complete, [job for job in self.jobs if job.done]
+        done = [job for cell in cells or self.targets for job in self.targets[cell] if job.done]
+        trained = [read_json(training.path, ErIlError) for training in {job.needs[0] for job in done}]
         rolled_out = [load_notes(job.path) for job in done]
         return {
             "computed_by": sorted({notes["git"] for notes in (*trained, *rolled_out)}),
@@ -135,5 +133,4 @@ class CellPlan[G: SeededGrid[Any], C: LabelledCell, J: RolloutJob](ABC):
                 "rollouts": sum(job.size for job in done),
                 "rollout_cpu_s": round(sum(notes["cost"]["cpu"] for notes in rolled_out)),
             },
-            "missing": [cell.labels for cell in self.grid.cells if cell not in complete],
         }

@@ -53,4 +53,5 @@ def _meta(plan: Plan) -> dict[str, Any]:
         "training_steps": dict(sorted({(training.space, training.size) for training in trainings})),
         "mixed_precision": sorted({notes["mixed_precision"] for notes in trained}),
         "rollout_seeds": f"{FIRST_SEED} to {FIRST_SEED + plan.grid.rollouts - 1}",
-    } | plan.account(trained)
+        "missing": [cell.labels for cell in plan.grid.cells if cell not in plan.complete],
+    } | plan.account()

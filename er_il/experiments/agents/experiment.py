@@ -9,7 +9,7 @@ import numpy as np
 
 from er_il.evaluation.aggregate import interquartile_mean, stratified_interval
 from er_il.evaluation.recording import SUCCESS
-from er_il.evaluation.results import COUNTS, report_cells
+from er_il.evaluation.results import COUNTS, difference_to_reference, report_cells
 from er_il.evaluation.rollout import FIRST_SEED
 from er_il.evaluation.trace import Trace
 from er_il.experiments.agents.grid import AgentCell
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 CELL = ("task", "decoder")
+COSTS = ("trainings", "training_cpu_s", "rollouts", "rollout_cpu_s")
 
 
 @dataclass(frozen=True)
@@ -39,14 +40,23 @@ class Learning:
         return f"{cell.task} {cell.name}: {', '.join(map(str, success))} of {self.plan.grid.episodes}"
 
     def results(self) -> "tuple[dict[str, Any], pd.DataFrame, Sequence[str]]":
-        plan = self.plan
-        complete = plan.complete
-        rollouts = plan.rollouts(*complete)
-        cells = report_cells(rollouts, CELL) if complete else []
-        for cell, report in zip(complete, cells, strict=True):
-            report |= {"mode": cell.mode, "variant": cell.variant, "curve": self._curve(cell)}
-        report = {"meta": self._meta(), "cells": cells, "suite": _suite(cells, list(plan.grid.tasks))}
-        return report, rollouts, ["task", "decoder", "training_seed", *COUNTS]
+        import pandas as pd
+
+        plan, complete = self.plan, self.plan.complete
+        kept = [cell for cell in plan.published.reports if cell not in complete]
+        rollouts = {cell: plan.published.of(cell) for cell in kept} | {cell: plan.rollouts(cell) for cell in complete}
+        rollouts = {cell: rollouts[cell] for cell in plan.grid.cells if cell in rollouts}
+        everything = pd.concat(rollouts.values()) if rollouts else plan.rollouts()
+        cells = []
+        for cell, of_cell in rollouts.items():
+            if cell in complete:
+                [report] = report_cells(of_cell, CELL)
+                report |= {"mode": cell.mode, "variant": cell.variant, "curve": self._curve(cell)} | plan.account(cell)
+            else:
+                report = plan.published.reports[cell]
+            cells.append(report | difference_to_reference(of_cell, CELL, everything))
+        report = {"meta": self._meta(cells), "cells": cells, "suite": _suite(cells, list(plan.grid.tasks))}
+        return report, everything, [*CELL, "training_seed", *COUNTS]
 
     def films(self, all_of_them: bool) -> Mapping[str, Sequence[FilmAgent]]:
         return self.plan.films()
@@ -71,14 +81,18 @@ class Learning:
             "invalid_rates": [[each["invalid_rate"] for each in of_seed] for of_seed in notes],
         }
 
-    def _meta(self) -> dict[str, Any]:
-        plan = self.plan
+    def _meta(self, cells: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+        plan, found = self.plan, {(cell["task"], cell["decoder"]) for cell in cells}
+        costs = [cell["costs"] for cell in cells if "costs" in cell]  # reports before version 0.3 have none of a cell
         return {
             "title": plan.grid.title,
             "grid": plan.grid.to_dict(),
             "settings": plan.settings.to_dict(),
             "rollout_seeds": f"{FIRST_SEED} to {FIRST_SEED + plan.grid.episodes - 1}",
-        } | plan.account(plan.trained())
+            "computed_by": sorted({code for cell in cells for code in cell["computed_by"]}),
+            "costs": {name: sum(each[name] for each in costs) for name in COSTS},
+            "missing": [cell.labels for cell in plan.grid.cells if (cell.task, cell.name) not in found],
+        }
 
 
 def _suite(cells: Sequence[Mapping[str, Any]], tasks: Sequence[str]) -> list[dict[str, Any]]:

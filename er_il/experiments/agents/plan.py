@@ -1,13 +1,15 @@
 """From a grid of agents to jobs: which files an experiment consists of."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from pathlib import Path
+from typing import Any, Self
 
 from er_il.evaluation.rollout import FIRST_SEED
 from er_il.experiments.agents.grid import AgentCell, AgentGrid
 from er_il.experiments.agents.jobs import AssessAgent, FilmAgent, TrainAgent
+from er_il.experiments.agents.published import Published, read_published
 from er_il.experiments.cell_plan import CellPlan
 from er_il.experiments.owner import owner_of
 from er_il.rl.settings import Settings
@@ -16,7 +18,17 @@ from er_il.support.errors import ErIlError
 
 @dataclass(frozen=True)
 class AgentPlan(CellPlan[AgentGrid, AgentCell, AssessAgent]):
-    """The jobs of agents that learn by reinforcement."""
+    """The jobs of agents that learn by reinforcement, but for cells that are published unless the folder has them."""
+
+    published: Published = field(default_factory=Published, hash=False)
+
+    def beside(self, folder: Path) -> Self:
+        """This plan without the cells that a report has.
+
+        Raises:
+            ErIlError: the report is damaged, or of agents that learnt otherwise.
+        """
+        return replace(self, published=read_published(folder, self.grid, self.settings.to_dict()))
 
     @cached_property
     def settings(self) -> Settings:
@@ -63,6 +75,13 @@ class AgentPlan(CellPlan[AgentGrid, AgentCell, AssessAgent]):
         for training in (self.training(cell, seed) for seed in self.grid.training_seeds):
             path = training.path.with_name(f"{training.path.stem}-{self.grid.episodes}-episodes.json")
             yield AssessAgent(path, f"assess {training.name}", (training,), self.grid.episodes)
+
+    @cached_property
+    def targets(self) -> dict[AgentCell, list[AssessAgent]]:
+        """The assessments of each cell that this folder has, or is to have."""
+        jobs = {cell: list(self.rollouts_of(cell)) for cell in self.grid.cells}
+        known = self.published.reports
+        return {cell: of_cell for cell, of_cell in jobs.items() if cell not in known or all(j.done for j in of_cell)}
 
     def films(self) -> dict[str, list[FilmAgent]]:
         """Of each task whose cells are complete, the first start through every mode, by the first seed's agents."""
