@@ -48,6 +48,8 @@ class GraspTask(ObjectTask):
 class CarryTask(GraspTask):
     """Grasp the target and bring it to the mark: done once its grasp point is there."""
 
+    reward = Reward(reach=0.125, lift=0.5, success=0.375)
+
     def _build(self, spec: mujoco.MjSpec) -> None:
         add_goal(spec, MARK, MARK_RADIUS, MARK_COLOUR)
 

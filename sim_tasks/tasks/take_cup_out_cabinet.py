@@ -32,7 +32,7 @@ class TakeCupOutCabinet(ObjectTask):
     arms = ("panda", "panda8")
     cabinet = Cupboard()
     start = (0.0, -1.357, 0.0, -2.584, 0.0, 2.099, np.pi / 4)  # the hand forward, well before the cabinet
-    reward = Reward(reach=0.4, take=0.4, success=0.2)
+    reward = Reward(reach=0.125, take=0.5, success=0.375)
 
     def __init__(
         self,
