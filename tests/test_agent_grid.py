@@ -157,8 +157,6 @@ def add_the_cells_of_another_folder(file: Path, out: Path, results: Path, all_he
     rows = gzip.decompress((results / "episodes.csv.gz").read_bytes())
     benchmark(file, out=out, results=results, add=True)  # the same again
     assert rows == gzip.decompress((results / "episodes.csv.gz").read_bytes()) and rows.count(b"\n") == 5
-    benchmark(file, out=out, results=results)  # what the folder itself lacks is run, and the report is of it alone
-    assert len(list((out / "agents/reach_target").iterdir())) == 2
 
 
 def test_a_report_that_cells_cannot_be_added_to_is_named(tmp_path: Path) -> None:
