@@ -45,7 +45,7 @@ class Imitation:
 
 
 def _meta(plan: Plan) -> dict[str, Any]:
-    trained = plan.trained()
+    trained, complete = plan.trained(), plan.complete
     trainings = {job.needs[0] for job in plan.jobs}
     return {
         "title": plan.grid.title,
@@ -53,5 +53,5 @@ def _meta(plan: Plan) -> dict[str, Any]:
         "training_steps": dict(sorted({(training.space, training.size) for training in trainings})),
         "mixed_precision": sorted({notes["mixed_precision"] for notes in trained}),
         "rollout_seeds": f"{FIRST_SEED} to {FIRST_SEED + plan.grid.rollouts - 1}",
-        "missing": [cell.labels for cell in plan.grid.cells if cell not in plan.complete],
+        "missing": [cell.labels for cell in plan.grid.cells if cell not in complete],
     } | plan.account()
