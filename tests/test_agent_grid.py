@@ -97,6 +97,7 @@ def test_a_grid_of_agents_from_end_to_end(
 ) -> None:
     monkeypatch.setattr("er_il.support.workers.LocalExecutor", lambda workers: nullcontext(InOrder()))
     monkeypatch.setattr(Settings, "shipped", lambda pixels: SMALL)
+    monkeypatch.setattr("er_il.envs.learning.DECISIONS", 40)  # of 200: films of these agents show nothing later on
     monkeypatch.chdir(tmp_path)
     file, out, results = (Path(f"{name}rl_full_body{suffix}") for name, suffix in PLACES)
     file.parent.mkdir()
