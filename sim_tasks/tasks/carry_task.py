@@ -32,6 +32,10 @@ class GraspTask(ObjectTask):
         """Where the fingers are to close, in the base frame (3,) [m]."""
         return self.point(self.target, self.grasp_offset)
 
+    def _approach(self) -> float:
+        """Progress in (0, 1] of the empty hand towards the grasp."""
+        return self._reach(self.grasp_point)
+
     @abstractmethod
     def _lift(self) -> float:
         """Progress in [0, 1] of lifting the held target, 1 once done."""
@@ -42,7 +46,7 @@ class GraspTask(ObjectTask):
     def _progress(self) -> dict[str, float]:
         if self.held == self.target:
             return {"reach": 1.0, "lift": self._lift()}
-        return {"reach": self._reach(self.grasp_point), "lift": 0.0}
+        return {"reach": self._approach(), "lift": 0.0}
 
 
 class CarryTask(GraspTask):

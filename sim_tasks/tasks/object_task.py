@@ -26,6 +26,7 @@ from sim_tasks.world.scene import BENCH_CENTRE, BENCH_SIZE
 
 WIDTH = 0.25  # [m] of the reward's middle kernel over distances; the paper's only one is 1 m wide
 TURN_WIDTH = 0.5  # [rad] of that over every angle
+PALM = 0.1  # [m] behind the fingertips: a second point of the hand, to tell how it is turned
 TIMESTEP = 0.004  # [s] of physics
 FALLEN, FELL = 0.1, "fell"  # [m] below the bench's top at which a thing has fallen off it
 ATTACHED, FRICTION = "attached", "friction"
@@ -134,6 +135,15 @@ class ObjectTask(ArmTask):
     def _reach(self, point: Vector) -> float:
         """Closeness in (0, 1] of the fingertips to a point (3,) [m]."""
         return closeness(float(np.linalg.norm(self.tip - point)), WIDTH)
+
+    def _reach_down(self, point: Vector) -> float:
+        """Closeness in (0, 1] of the hand to a point (3,) [m], fingers down: of their tips to it, of the palm to above.
+
+        A hand that tilts on its way is not told so by its fingertips alone.
+        """
+        palm = self.tip - PALM * self.data.xmat[self._tip].reshape(3, 3)[:, 2]
+        away = np.linalg.norm(self.tip - point) + np.linalg.norm(palm - point - (0.0, 0.0, PALM))
+        return closeness(float(away) / 2, WIDTH)
 
     def _put(self, name: str, position: Sequence[float], quaternion: Sequence[float] = UPRIGHT) -> None:
         """Put an object of an episode that begins: position [m] before a Panda, quaternion (w, x, y, z)."""

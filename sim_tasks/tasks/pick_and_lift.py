@@ -10,6 +10,7 @@ from er_il.arms.arm import Vector
 from sim_tasks.tasks.among_others import draw_among_others
 from sim_tasks.tasks.carry_task import MARK, CarryTask
 from sim_tasks.tasks.placement import Placement, yawed
+from sim_tasks.tasks.rewards import Reward
 from sim_tasks.world.blocks import BLOCK, block
 from sim_tasks.world.household import Rgba
 from sim_tasks.world.randomisation import interval, sides, span
@@ -33,6 +34,7 @@ class PickAndLift(CarryTask):
     target = RED
     grasp_offset = (0.0, 0.0, BLOCK / 2)
     centre = (0.475, 0.0)  # x, y [m] of the middle of the red block's places, and of the mark's
+    reward = Reward(reach=0.0625, lift=0.5, success=0.4375)
 
     def __init__(
         self,
@@ -65,6 +67,9 @@ class PickAndLift(CarryTask):
     @property
     def directions(self) -> Mapping[str, Vector]:
         return {RED: self.rotation(RED)[:, 0]}
+
+    def _approach(self) -> float:
+        return self._reach_down(self.grasp_point)
 
     def _build(self, spec: mujoco.MjSpec) -> None:
         super()._build(spec)

@@ -108,14 +108,14 @@ class PutRubbishInBin(ReleaseTask):
         rubbish = self.rubbish
         carry = lower = opened = 0.0
         if self.held != RUBBISH:
-            reach = self._reach(rubbish)
+            reach = self._reach_down(rubbish)
             return {"reach": reach, "carry": carry, "lower": lower, "open": opened}
         high, low = self.above_rim(HIGH), self.above_rim(LOW)
         if np.linalg.norm(rubbish[:2] - high[:2]) > OVER:
             carry = closeness(float(np.linalg.norm(rubbish - high)), WIDTH)
         else:
-            carry, left = 1.0, abs(float(rubbish[2] - low[2]))
-            lower, opened = (1.0, self.commanded_opening) if left < LOWERED else (closeness(left, WIDTH), 0.0)
+            carry, left, opened = 1.0, abs(float(rubbish[2] - low[2])), self.commanded_opening
+            lower = 1.0 if left < LOWERED else closeness(left, WIDTH)
         return {"reach": 1.0, "carry": carry, "lower": lower, "open": opened}
 
 
