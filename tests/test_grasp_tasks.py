@@ -4,11 +4,14 @@ import gymnasium
 import mujoco
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from er_il.envs import make_rl_env
 from sim_tasks.tasks.carry_task import ARRIVED, MARK, GraspTask
+from sim_tasks.tasks.object_task import WIDTH
 from sim_tasks.tasks.pick_and_lift import LEAST, PickAndLift
 from sim_tasks.tasks.pick_up_cup import LEFT
+from sim_tasks.tasks.rewards import closeness
 from sim_tasks.tasks.take_lid_off_saucepan import LIFT, SAUCEPAN, TakeLidOffSaucepan
 from sim_tasks.world.blocks import BLOCK
 from sim_tasks.world.contact import touching
@@ -103,6 +106,21 @@ def test_the_lid_lies_still_on_its_pan_and_the_mark_is_above_it(arm: str) -> Non
         assert np.allclose(world.object_pose("lid"), start, atol=1e-3)
         assert np.allclose(world.position(SAUCEPAN)[:2], world.position("lid")[:2], atol=1e-3)
         assert np.allclose(world.position(MARK) - world.grasp_point, (0.0, 0.0, LIFT), atol=2e-3)
+
+
+def test_a_tilted_hand_is_farther_from_a_block_than_one_that_points_down() -> None:
+    world = make("PickAndLift")
+    world.reset(seed=0)
+
+    def reach(offset: tuple[float, float, float], tilt: float) -> float:
+        world.data.xpos[world._tip] = world.grasp_point + offset
+        world.data.xmat[world._tip] = Rotation.from_euler("x", np.pi + tilt).as_matrix().ravel()
+        return world._progress()["reach"]
+
+    assert reach((0.0, 0.0, 0.0), 0.0) == pytest.approx(1.0)
+    assert reach((0.0, 0.0, 0.1), 0.0) == pytest.approx(closeness(0.1, WIDTH))
+    away = [reach((0.03, 0.0, 0.0), tilt) for tilt in (0.0, 0.3, 0.6, np.pi)]
+    assert away == sorted(away, reverse=True) and away[2] < 0.95 * away[0]
 
 
 def test_blocks_leave_room_for_the_fingers_and_the_mark_is_above_the_bench() -> None:

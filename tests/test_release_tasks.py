@@ -99,7 +99,7 @@ def test_the_way_of_the_rubbish_leads_over_the_bin_before_it_leads_down() -> Non
     far, near, over, low = progress
     assert far["carry"] < near["carry"] < over["carry"] == 1.0
     assert far["lower"] == near["lower"] == 0.0 < over["lower"] < low["lower"] == 1.0
-    assert far["open"] == over["open"] == 0.0 and low["open"] == 1.0  # as it is told to be
+    assert far["open"] == near["open"] == 0.0 and over["open"] == low["open"] == 1.0  # as it is told to be
 
 
 def test_a_phone_counts_in_the_cradle_and_not_across_it_or_upside_down() -> None:
