@@ -100,6 +100,11 @@ class ObjectTask(ArmTask):
         return self.data.xpos[self._tip]
 
     @property
+    def tip_rotation(self) -> np.ndarray:
+        """Orientation of the hand in the base frame (3, 3), its z axis along the fingers."""
+        return self.data.xmat[self._tip].reshape(3, 3)
+
+    @property
     def held(self) -> str:
         """The thing that the hand holds; "" if it holds nothing."""
         if self._attaches:
@@ -137,11 +142,11 @@ class ObjectTask(ArmTask):
         return closeness(float(np.linalg.norm(self.tip - point)), WIDTH)
 
     def _reach_down(self, point: Vector) -> float:
-        """Closeness in (0, 1] of the hand to a point (3,) [m], fingers down: of their tips to it, of the palm to above.
+        """Closeness in (0, 1] to a hand that is at a point (3,) [m] with its fingers down.
 
-        A hand that tilts on its way is not told so by its fingertips alone.
+        By the mean of two distances: of the fingertips to the point, and of the palm to the place above it.
         """
-        palm = self.tip - PALM * self.data.xmat[self._tip].reshape(3, 3)[:, 2]
+        palm = self.tip - PALM * self.tip_rotation[:, 2]
         away = np.linalg.norm(self.tip - point) + np.linalg.norm(palm - point - (0.0, 0.0, PALM))
         return closeness(float(away) / 2, WIDTH)
 

@@ -127,8 +127,7 @@ class ReachElbowPose(ObjectTask):
 
     def _turn_left(self) -> Vector:
         """The rotation vector (3,) [rad] by which the hand is yet to turn, in the goal's frame."""
-        tip = self.data.xmat[self._tip].reshape(3, 3)
-        return Rotation.from_matrix(tip.T @ self.rotation(HAND_GOAL)).as_rotvec()
+        return Rotation.from_matrix(self.tip_rotation.T @ self.rotation(HAND_GOAL)).as_rotvec()
 
     def _turn(self) -> float:
         """Mean [rad] over the three axes of the turn that the hand lacks."""
