@@ -5,6 +5,8 @@ import numpy as np
 import pytest
 from playing import play_on
 
+from sim_tasks.tasks.object_task import WIDTH
+from sim_tasks.tasks.rewards import closeness
 from sim_tasks.tasks.take_bottle_out_fridge import BOTTLE, OPEN, TakeBottleOutFridge
 
 CLOSED, WIDE = 0.0, 1.0  # openings of the gripper
@@ -62,15 +64,30 @@ def test_a_door_opened_without_the_bottle_falls_shut_again() -> None:
     assert world.door_angle < np.radians(20)
 
 
-def test_a_bottle_moved_before_earns_nothing_and_comes_out_in_vain() -> None:
+def test_a_bottle_moved_before_earns_less_and_comes_out_in_vain() -> None:
     world = make()
     actions = demonstration(world)
     grasped = np.append(world.joint_positions, CLOSED)
-    assert play_on(world, [grasped] * 8)["reward_terms"]["grasp"] == 0.0625
+    held = play_on(world, [grasped] * 8)["reward_terms"]
+    assert held["grasp"] == world.reward.weights["grasp"] and held["door"] > 0.0
     out = np.linspace(grasped, actions[-1], 60)  # past the door, which leans on the arm
     info = play_on(world, [*out, *[actions[-1]] * 20])
-    assert world.grasped and not world.opened
-    assert sum(info["reward_terms"].values()) == 0.0 and not info["is_success"]
+    assert world.grasped and not world.opened and not info["is_success"]
+    assert 0.0 < info["reward_terms"]["door"] < held["door"] / 2  # the way back is worth it
+    assert info["reward_terms"]["out"] == info["reward_terms"]["success"] == 0.0
+
+
+def test_a_bottle_comes_out_by_the_front() -> None:
+    world = make()
+    rewards, straight = [], []
+    for action in demonstration(world):
+        reward = world.step(action)[4]["reward_terms"]["out"]
+        if world.opened:
+            rewards.append(reward)
+            straight.append(world.reward.weights["out"] * closeness(float(np.linalg.norm(world.ways["mark"])), WIDTH))
+    assert rewards[0] < straight[0] - 0.01  # not through the side
+    assert np.all(np.diff(rewards) > -1e-4)
+    assert rewards[-1] == world.reward.weights["out"]
 
 
 def test_a_bottle_let_go_outside_is_not_taken() -> None:

@@ -27,6 +27,7 @@ OPEN = np.radians(45)  # of the door, from which it stays open
 STILL = 0.025  # [m] by which the bottle may move before
 NECK, AHEAD = 0.20, 0.012  # [m] height on the bottle at which the hand starts, distance of its axis before the tip
 MARK = (0.48, 0.00, 0.38)  # [m] outside, beyond the swing of the door
+OUTSIDE = 0.56  # x [m] before the fridge, from where nothing is between the bottle and the mark
 TAKEN = 0.06  # [m] from the mark
 WIDEST, CLOSE = np.radians(90), 0.005  # [rad] opening from which the door falls onto the arm at the start, to within
 
@@ -132,11 +133,20 @@ class TakeBottleOutFridge(ObjectTask):
             self._hinge.range[0], self._hinge.stiffness[0] = OPEN, 0.0
 
     def _still(self) -> bool:
-        return bool(np.linalg.norm(self.position(BOTTLE) - self._place_of_bottle) <= STILL)
+        return self._moved() <= STILL
+
+    def _moved(self) -> float:
+        """Distance [m] of the bottle from where it stood."""
+        return float(np.linalg.norm(self.position(BOTTLE) - self._place_of_bottle))
 
     def _distance(self) -> float:
         """Distance [m] of the bottle's neck from the mark."""
         return float(np.linalg.norm(self._neck - self.mark))
+
+    def _way(self) -> float:
+        """Length [m] of the neck's way to the mark: straight out of the fridge, then straight on."""
+        inside = max(float(self._neck[0]) - OUTSIDE, 0.0)
+        return inside + float(np.linalg.norm(self._neck - (inside, 0.0, 0.0) - self.mark))
 
     @property
     def _neck(self) -> Vector:
@@ -146,9 +156,9 @@ class TakeBottleOutFridge(ObjectTask):
         return self.grasped and self.opened and self._distance() <= TAKEN
 
     def _progress(self) -> dict[str, float]:
-        if not self.grasped or not (self.opened or self._still()):
+        if not self.grasped:
             return {"grasp": 0.0, "door": 0.0, "out": 0.0}
         if not self.opened:
-            return {"grasp": 1.0, "door": closeness(OPEN - self.door_angle, TURN_WIDTH), "out": 0.0}
-        distance = self._distance()
-        return {"grasp": 1.0, "door": 1.0, "out": 1.0 if distance <= TAKEN else closeness(distance, WIDTH)}
+            still = closeness(self._moved() - STILL, WIDTH)
+            return {"grasp": 1.0, "door": still * closeness(OPEN - self.door_angle, TURN_WIDTH), "out": 0.0}
+        return {"grasp": 1.0, "door": 1.0, "out": 1.0 if self._distance() <= TAKEN else closeness(self._way(), WIDTH)}
