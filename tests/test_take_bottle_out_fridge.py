@@ -5,8 +5,6 @@ import numpy as np
 import pytest
 from playing import play_on
 
-from sim_tasks.tasks.object_task import WIDTH
-from sim_tasks.tasks.rewards import closeness
 from sim_tasks.tasks.take_bottle_out_fridge import BOTTLE, OPEN, TakeBottleOutFridge
 
 CLOSED, WIDE = 0.0, 1.0  # openings of the gripper
@@ -45,7 +43,7 @@ def test_the_door_stays_open_once_it_was_opened_with_the_bottle_held_still() -> 
     for action in actions:
         info = world.step(action)[4]
         widest = max(widest, world.door_angle)
-        assert world.opened == (info["reward_terms"]["door"] == 0.25)
+        assert world.opened == (info["reward_terms"]["door"] == world.reward.weights["door"])
         assert world.opened or widest < OPEN + 0.05
     assert info["is_success"]
     play_on(world, [actions[-1]] * 40)
@@ -74,20 +72,24 @@ def test_a_bottle_moved_before_earns_less_and_comes_out_in_vain() -> None:
     info = play_on(world, [*out, *[actions[-1]] * 20])
     assert world.grasped and not world.opened and not info["is_success"]
     assert 0.0 < info["reward_terms"]["door"] < held["door"] / 2  # the way back is worth it
-    assert info["reward_terms"]["out"] == info["reward_terms"]["success"] == 0.0
+    assert all(info["reward_terms"][later] == 0.0 for later in ("pull", "out", "success"))
 
 
-def test_a_bottle_comes_out_by_the_front() -> None:
+def test_the_pull_is_paid_straight_out_of_the_fridge() -> None:
     world = make()
-    rewards, straight = [], []
-    for action in demonstration(world):
-        reward = world.step(action)[4]["reward_terms"]["out"]
+    actions = demonstration(world)
+    rows = []
+    for action in actions:
+        terms = world.step(action)[4]["reward_terms"]
         if world.opened:
-            rewards.append(reward)
-            straight.append(world.reward.weights["out"] * closeness(float(np.linalg.norm(world.ways["mark"])), WIDTH))
-    assert rewards[0] < straight[0] - 0.01  # not through the side
-    assert np.all(np.diff(rewards) > -1e-4)
-    assert rewards[-1] == world.reward.weights["out"]
+            left = world.ways["mark"]
+            rows.append((terms["pull"], terms["out"], -left[0], -left[1]))
+    pull, out, before, aside = np.array(rows).T  # [m] of the last two: behind the mark, and to its left
+    assert pull[0] == pytest.approx(0.0, abs=0.002) and pull[-1] == world.reward.weights["pull"]
+    assert out[-1] == world.reward.weights["out"]
+    straight = aside > 0.3  # the bottle comes out of the fridge before it goes to the side
+    assert np.ptp(pull[straight]) > 5 * np.ptp(out[straight])
+    assert np.corrcoef(pull[straight], before[straight])[0, 1] < -0.999
 
 
 def test_a_bottle_let_go_outside_is_not_taken() -> None:

@@ -43,7 +43,7 @@ class TakeBottleOutFridge(ObjectTask):
     centre = (0.77, 0.33)  # x, y [m] of the bottle's mean place
     area = Area.around((fridge.front + fridge.depth / 2, fridge.side), (fridge.depth - 0.08, fridge.inner_width - 0.08))
     start = (0.06, 0.65, 0.40, -1.46, -0.88, 2.88, 1.50)  # the hand at the bottle, the elbow a little to the right
-    reward = Reward(grasp=0.0625, door=0.25, out=0.3125, success=0.375)
+    reward = Reward(grasp=0.0625, door=0.1875, pull=0.1875, out=0.25, success=0.3125)
 
     def __init__(self, *, bottle_range: tuple[float, float] = (0.05, 0.04), **kwargs: Any) -> None:
         """Build the task.
@@ -143,10 +143,10 @@ class TakeBottleOutFridge(ObjectTask):
         """Distance [m] of the bottle's neck from the mark."""
         return float(np.linalg.norm(self._neck - self.mark))
 
-    def _way(self) -> float:
-        """Length [m] of the neck's way to the mark: straight out of the fridge, then straight on."""
-        inside = max(float(self._neck[0]) - OUTSIDE, 0.0)
-        return inside + float(np.linalg.norm(self._neck - (inside, 0.0, 0.0) - self.mark))
+    def _pulled(self) -> float:
+        """Share of the way straight out of the fridge that the bottle's neck has made, at most 1."""
+        inside, whole = (place - OUTSIDE for place in (self._neck[0], self._place_of_bottle[0]))
+        return 1.0 - max(float(inside / whole), 0.0)
 
     @property
     def _neck(self) -> Vector:
@@ -156,9 +156,13 @@ class TakeBottleOutFridge(ObjectTask):
         return self.grasped and self.opened and self._distance() <= TAKEN
 
     def _progress(self) -> dict[str, float]:
+        done = dict.fromkeys(self.reward.weights, 0.0)
         if not self.grasped:
-            return {"grasp": 0.0, "door": 0.0, "out": 0.0}
+            return done
         if not self.opened:
             still = closeness(self._moved() - STILL, WIDTH)
-            return {"grasp": 1.0, "door": still * closeness(OPEN - self.door_angle, TURN_WIDTH), "out": 0.0}
-        return {"grasp": 1.0, "door": 1.0, "out": 1.0 if self._distance() <= TAKEN else closeness(self._way(), WIDTH)}
+            return done | {"grasp": 1.0, "door": still * closeness(OPEN - self.door_angle, TURN_WIDTH)}
+        distance = self._distance()
+        if distance <= TAKEN:
+            return dict.fromkeys(done, 1.0)
+        return done | {"grasp": 1.0, "door": 1.0, "pull": self._pulled(), "out": closeness(distance, WIDTH)}
