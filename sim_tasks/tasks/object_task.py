@@ -32,6 +32,7 @@ FALLEN, FELL = 0.1, "fell"  # [m] below the bench's top at which a thing has fal
 ATTACHED, FRICTION = "attached", "friction"
 GRIPS = (ATTACHED, FRICTION)
 
+DOWN = np.array([0.0, 0.0, -1.0])
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)  # quaternion (w, x, y, z)
 
 
@@ -141,14 +142,18 @@ class ObjectTask(ArmTask):
         """Closeness in (0, 1] of the fingertips to a point (3,) [m]."""
         return closeness(float(np.linalg.norm(self.tip - point)), WIDTH)
 
-    def _reach_down(self, point: Vector) -> float:
-        """Closeness in (0, 1] to a hand that is at a point (3,) [m] with its fingers down.
+    def _reach_along(self, direction: Vector, point: Vector) -> float:
+        """Closeness in (0, 1] to a hand that is at a point (3,) [m] with its fingers along a unit vector (3,).
 
-        By the mean of two distances: of the fingertips to the point, and of the palm to the place above it.
+        By the mean of two distances: of the fingertips to the point, and of the palm to the place behind it.
         """
         palm = self.tip - PALM * self.tip_rotation[:, 2]
-        away = np.linalg.norm(self.tip - point) + np.linalg.norm(palm - point - (0.0, 0.0, PALM))
+        away = np.linalg.norm(self.tip - point) + np.linalg.norm(palm - point + PALM * direction)
         return closeness(float(away) / 2, WIDTH)
+
+    def _reach_down(self, point: Vector) -> float:
+        """That of a hand with its fingers down."""
+        return self._reach_along(DOWN, point)
 
     def _put(self, name: str, position: Sequence[float], quaternion: Sequence[float] = UPRIGHT) -> None:
         """Put an object of an episode that begins: position [m] before a Panda, quaternion (w, x, y, z)."""
