@@ -83,6 +83,7 @@ def test_the_pull_is_paid_straight_out_of_the_fridge() -> None:
         terms = world.step(action)[4]["reward_terms"]
         if world.opened:
             left = world.ways["mark"]
+            assert not world.ways["place"].any()  # an open door shows in what is observed
             rows.append((terms["pull"], terms["out"], -left[0], -left[1]))
     pull, out, before, aside = np.array(rows).T  # [m] of the last two: behind the mark, and to its left
     assert pull[0] == pytest.approx(0.0, abs=0.002) and pull[-1] == world.reward.weights["pull"]

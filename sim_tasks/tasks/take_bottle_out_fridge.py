@@ -107,11 +107,8 @@ class TakeBottleOutFridge(ObjectTask):
 
     @property
     def ways(self) -> Mapping[str, Vector]:
-        return {
-            BOTTLE: self._neck - self.tip,
-            "place": self._place_of_bottle - self.position(BOTTLE),
-            "mark": self.mark - self._neck,
-        }
+        moved = np.zeros(3) if self.opened else self.position(BOTTLE) - self._place_of_bottle  # as far as it matters
+        return {BOTTLE: self._neck - self.tip, "place": -moved, "mark": self.mark - self._neck}
 
     @property
     def directions(self) -> Mapping[str, Vector]:
