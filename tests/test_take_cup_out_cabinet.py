@@ -42,7 +42,7 @@ def test_a_cup_at_the_goal_counts_only_while_it_is_held(world: TakeCupOutCabinet
     assert info["is_success"] and reward == 1.0
     for _ in range(10):
         _, reward, _, _, info = world.step(np.append(action[:-1], 1.0))
-    assert not info["is_success"] and reward < world.reward.weights["reach"]
+    assert not info["is_success"] and reward < 0.125
     assert info["reward_terms"]["take"] == 0.0
 
 
@@ -60,20 +60,6 @@ def test_a_hand_that_stays_open_takes_nothing_and_a_grasp_inside_is_no_success(w
     assert info["reward_terms"]["reach"] == world.reward.weights["reach"]
     assert 0 < info["reward_terms"]["take"] < 0.7 * world.reward.weights["take"]
     assert info["reward_terms"]["success"] == 0.0
-
-
-def test_reaching_the_cup_from_aside_earns_less(world: TakeCupOutCabinet) -> None:
-    world.reset(seed=38)
-    for action in world.leader(38):
-        world.step(np.append(action[:-1], 1.0))
-        if action[-1] < 0.5:
-            break
-    ahead = world.step(np.append(action[:-1], 1.0))[4]["reward_terms"]["reach"]
-    yaw, aside = np.radians(turn(world)), []
-    for half in ((yaw + 0.4) / 2, (yaw - 0.4) / 2):
-        world.data.mocap_quat[world.model.body(CABINET).mocapid[0]] = np.cos(half), 0.0, 0.0, np.sin(half)
-        aside.append(world.step(np.append(action[:-1], 1.0))[4]["reward_terms"]["reach"])
-    assert max(aside) < ahead
 
 
 def test_the_cabinet_stops_the_arm_and_ends_nothing(world: TakeCupOutCabinet) -> None:

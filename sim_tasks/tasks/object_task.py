@@ -21,7 +21,7 @@ from sim_tasks.world.attachment import Attachment, add_attachments, is_open
 from sim_tasks.world.contact import touching
 from sim_tasks.world.grip import slow_grip
 from sim_tasks.world.props import BOX, SPHERE
-from sim_tasks.world.robot import TIP
+from sim_tasks.world.robot import TIP, smooth_links
 from sim_tasks.world.scene import BENCH_CENTRE, BENCH_SIZE
 
 WIDTH = 0.25  # [m] of the reward's middle kernel over distances; the paper's only one is 1 m wide
@@ -32,7 +32,6 @@ FALLEN, FELL = 0.1, "fell"  # [m] below the bench's top at which a thing has fal
 ATTACHED, FRICTION = "attached", "friction"
 GRIPS = (ATTACHED, FRICTION)
 
-DOWN = np.array([0.0, 0.0, -1.0])
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)  # quaternion (w, x, y, z)
 
 
@@ -72,6 +71,7 @@ class ObjectTask(ArmTask):
         spec = super().world_spec()
         spec.option.timestep = TIMESTEP
         slow_grip(spec, self.graspable)
+        smooth_links(spec, self.arm)
         if self.shoulder_offset > 0:
             (x, y), (length, width), height = BENCH_CENTRE, BENCH_SIZE, self.shoulder_offset
             # Beside the base, which stands on the bench itself.
@@ -142,18 +142,14 @@ class ObjectTask(ArmTask):
         """Closeness in (0, 1] of the fingertips to a point (3,) [m]."""
         return closeness(float(np.linalg.norm(self.tip - point)), WIDTH)
 
-    def _reach_along(self, direction: Vector, point: Vector) -> float:
-        """Closeness in (0, 1] to a hand that is at a point (3,) [m] with its fingers along a unit vector (3,).
+    def _reach_down(self, point: Vector) -> float:
+        """Closeness in (0, 1] to a hand that is at a point (3,) [m] with its fingers down.
 
-        By the mean of two distances: of the fingertips to the point, and of the palm to the place behind it.
+        By the mean of two distances: of the fingertips to the point, and of the palm to the place above it.
         """
         palm = self.tip - PALM * self.tip_rotation[:, 2]
-        away = np.linalg.norm(self.tip - point) + np.linalg.norm(palm - point + PALM * direction)
+        away = np.linalg.norm(self.tip - point) + np.linalg.norm(palm - point - (0.0, 0.0, PALM))
         return closeness(float(away) / 2, WIDTH)
-
-    def _reach_down(self, point: Vector) -> float:
-        """That of a hand with its fingers down."""
-        return self._reach_along(DOWN, point)
 
     def _put(self, name: str, position: Sequence[float], quaternion: Sequence[float] = UPRIGHT) -> None:
         """Put an object of an episode that begins: position [m] before a Panda, quaternion (w, x, y, z)."""

@@ -159,7 +159,8 @@ class TakeBottleOutFridge(ObjectTask):
         if not self.opened:
             still = closeness(self._moved() - STILL, WIDTH)
             return done | {"grasp": 1.0, "door": still * closeness(OPEN - self.door_angle, TURN_WIDTH)}
-        distance = self._distance()
+        distance, pulled = self._distance(), self._pulled()
         if distance <= TAKEN:
             return dict.fromkeys(done, 1.0)
-        return done | {"grasp": 1.0, "door": 1.0, "pull": self._pulled(), "out": closeness(distance, WIDTH)}
+        out = closeness(distance, WIDTH) if pulled == 1.0 else 0.0
+        return done | {"grasp": 1.0, "door": 1.0, "pull": pulled, "out": out}

@@ -100,6 +100,5 @@ class TakeCupOutCabinet(ObjectTask):
 
     def _progress(self) -> dict[str, float]:
         if not self.grasped:
-            inwards = self.rotation(CABINET)[:, 0]
-            return {"reach": self._reach_along(inwards, self.grasp_point), "take": 0.0}
+            return {"reach": self._reach(self.grasp_point), "take": 0.0}
         return {"reach": 1.0, "take": 1.0 if self._succeeds() else closeness(self._distance(), WIDTH)}

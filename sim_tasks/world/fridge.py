@@ -9,9 +9,6 @@ from sim_tasks.world.props import BOX, CYLINDER
 ENAMEL, LINING, CHROME = (0.93, 0.94, 0.95, 1.0), (0.80, 0.89, 0.95, 1.0), (0.62, 0.64, 0.67, 1.0)
 SEEN = {"mass": 0, "contype": 0, "conaffinity": 0, "group": 2}  # shapes that are only to be seen
 
-# By its priority whatever touches: the arm slides along glass and enamel, on which it would stick by MuJoCo's friction of 1.
-SMOOTH = {"friction": (0.1, 0.005, 0.0001), "priority": 1}
-
 
 @dataclass(frozen=True)
 class Fridge:
@@ -56,7 +53,7 @@ class Fridge:
             ((t, half_width - self.wall, half_height), (self.front + self.depth - t, 0, middle)),
         )
         for size, position in panes:
-            body.add_geom(type=BOX, size=size, pos=position, material="glass", **SMOOTH)
+            body.add_geom(type=BOX, size=size, pos=position, material="glass")
         self._add_looks(body, half_width)
         self._add_door(body, door, half_width)
 
@@ -88,13 +85,15 @@ class Fridge:
             damping=self.damping,
         )
         half, y, half_height = self.door / 2, -half_width, self._half_height + self.wall
+        # Smooth by its priority, whatever touches it: the arm slides along it.
         body.add_geom(
             type=BOX,
             size=(half, half_width, half_height),
             pos=(-half - 0.002, y, 0),
             rgba=ENAMEL,
             mass=self.mass,
-            **SMOOTH,
+            friction=(0.1, 0.005, 0.0001),
+            priority=1,
         )
         inside = (0.002, half_width - 0.02, half_height - 0.03)
         body.add_geom(type=BOX, size=inside, pos=(-0.001, y, 0), rgba=LINING, **SEEN)

@@ -15,6 +15,7 @@ SHOULDER = "panda_link1"  # the link that turns the upper arm; the tasks are mea
 HAND, TIP = "panda_hand", "panda_hand_tcp"  # the hand, and the point between its fingertips
 FINGERS = ("panda_finger_joint1", "panda_finger_joint2")
 FINGER_BODIES = ("panda_leftfinger", "panda_rightfinger")
+SMOOTH = (0.1, 0.005, 0.0001)  # friction of painted covers
 FINGER_TRAVEL = 0.04  # [m] each finger, from closed to open
 GRIPPER = "gripper"  # actuator name
 
@@ -110,6 +111,19 @@ def robot_spec(arm: Arm) -> mujoco.MjSpec:
     for one, other in ((lowest.parent.name, lowest.name), *OVERLAPPING):
         spec.add_exclude(bodyname1=one, bodyname2=other)
     return spec
+
+
+def smooth_links(spec: mujoco.MjSpec, arm: Arm) -> None:
+    """Let the arm slide along furniture, all but its fingers.
+
+    By MuJoCo's friction of 1 it sticks to what it leans on, held by the hundreds of newtons of its servos: a posture
+    that keeps still whatever noise is added to the commands, in which learning agents come to rest.
+    """
+    lowest = spec.joint(arm.joints[0]).parent
+    for body in (lowest, *lowest.find_all("body")):
+        if body.name not in FINGER_BODIES:
+            for geom in body.geoms:
+                geom.friction, geom.priority = SMOOTH, 1
 
 
 def set_physics(spec: mujoco.MjSpec) -> None:
