@@ -8,10 +8,9 @@ from sim_tasks.world.household import Thing
 
 
 def add_fixed(
-    spec: mujoco.MjSpec, thing: Thing, name: str, position: Sequence[float] = (0.0, 0.0, 0.0), *, movable: bool = False
+    spec: mujoco.MjSpec, thing: Thing, name: str, position: Sequence[float] = (0.0, 0.0, 0.0)
 ) -> mujoco.MjsBody:
-    """Add a thing without its free joint, at a position [m]; ``movable``: as a mocap body, put anywhere by a task."""
+    """Add a thing without its free joint, at a position [m]."""
     body = thing.add(spec, name, position)
     spec.delete(spec.joint(name))
-    body.mocap = movable
     return body
