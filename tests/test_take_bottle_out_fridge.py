@@ -75,7 +75,7 @@ def test_a_bottle_moved_before_earns_less_and_comes_out_in_vain() -> None:
     assert all(info["reward_terms"][later] == 0.0 for later in ("pull", "out", "success"))
 
 
-def test_the_pull_is_paid_straight_out_of_the_fridge() -> None:
+def test_the_way_is_paid_straight_out_of_the_fridge_then_to_the_mark() -> None:
     world = make()
     actions = demonstration(world)
     rows = []
@@ -84,13 +84,16 @@ def test_the_pull_is_paid_straight_out_of_the_fridge() -> None:
         if world.opened:
             left = world.ways["mark"]
             assert not world.ways["place"].any()  # an open door shows in what is observed
-            rows.append((terms["pull"], terms["out"], -left[0], -left[1]))
-    pull, out, before, aside = np.array(rows).T  # [m] of the last two: behind the mark, and to its left
+            rows.append((terms["pull"], terms["out"], -left[0], -left[1], np.linalg.norm(left)))
+    pull, out, before, aside, away = np.array(rows).T  # [m] of the last three: behind the mark, to its left, from it
     assert pull[0] == pytest.approx(0.0, abs=0.002) and pull[-1] == world.reward.weights["pull"]
     assert out[-1] == world.reward.weights["out"]
     straight = aside > 0.3  # the bottle comes out of the fridge before it goes to the side
     assert np.ptp(pull[straight]) > 5 * np.ptp(out[straight])
     assert np.corrcoef(pull[straight], before[straight])[0, 1] < -0.999
+    outside, complete = pull == pull[-1], out == out[-1]
+    assert not out[~outside].any() and out[outside][0] < 0.25 * out[-1]
+    assert np.corrcoef(out[outside & ~complete], away[outside & ~complete])[0, 1] < -0.999  # every step on is paid
 
 
 def test_a_bottle_let_go_outside_is_not_taken() -> None:

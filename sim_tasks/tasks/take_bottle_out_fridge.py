@@ -43,7 +43,7 @@ class TakeBottleOutFridge(ObjectTask):
     centre = (0.77, 0.33)  # x, y [m] of the bottle's mean place
     area = Area.around((fridge.front + fridge.depth / 2, fridge.side), (fridge.depth - 0.08, fridge.inner_width - 0.08))
     start = (0.06, 0.65, 0.40, -1.46, -0.88, 2.88, 1.50)  # the hand at the bottle, the elbow a little to the right
-    reward = Reward(grasp=0.0625, door=0.1875, pull=0.1875, out=0.25, success=0.3125)
+    reward = Reward(grasp=0.0625, door=0.125, pull=0.1875, out=0.25, success=0.375)
 
     def __init__(self, *, bottle_range: tuple[float, float] = (0.05, 0.04), **kwargs: Any) -> None:
         """Build the task.
@@ -145,6 +145,12 @@ class TakeBottleOutFridge(ObjectTask):
         inside, whole = (place - OUTSIDE for place in (self._neck[0], self._place_of_bottle[0]))
         return 1.0 - max(float(inside / whole), 0.0)
 
+    def _carried(self) -> float:
+        """Share of the way on to the mark that it has made, from where it comes out; 0 while it is inside."""
+        _, y, z = self._place_of_bottle
+        whole = np.linalg.norm(self.mark - (OUTSIDE, y, z + NECK))
+        return max(1.0 - float(self._distance() / whole), 0.0) if self._pulled() == 1.0 else 0.0
+
     @property
     def _neck(self) -> Vector:
         return self.point(BOTTLE, (0.0, 0.0, NECK))
@@ -159,8 +165,6 @@ class TakeBottleOutFridge(ObjectTask):
         if not self.opened:
             still = closeness(self._moved() - STILL, WIDTH)
             return done | {"grasp": 1.0, "door": still * closeness(OPEN - self.door_angle, TURN_WIDTH)}
-        distance, pulled = self._distance(), self._pulled()
-        if distance <= TAKEN:
+        if self._distance() <= TAKEN:
             return dict.fromkeys(done, 1.0)
-        out = closeness(distance, WIDTH) if pulled == 1.0 else 0.0
-        return done | {"grasp": 1.0, "door": 1.0, "pull": pulled, "out": out}
+        return done | {"grasp": 1.0, "door": 1.0, "pull": self._pulled(), "out": self._carried()}
