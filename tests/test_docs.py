@@ -101,6 +101,7 @@ def run_here(page: str) -> list[Block]:
 @pytest.mark.parametrize("page", [page for page in PAGES if run_here(page)])
 def test_the_commands_run(page: str, workspace: Path, monkeypatch: pytest.MonkeyPatch):
     PREPARED.get(page, lambda folder: None)(workspace)
+    monkeypatch.setattr("er_il.envs.learning.DECISIONS", 20)  # of 200
     train_in_process(monkeypatch, "--batch_size=2")
     names: dict[str, object] = {}
     for block in blocks(page):
