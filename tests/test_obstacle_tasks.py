@@ -6,7 +6,8 @@ from playing import play
 
 from er_il.kinematics.redundancy import JointAngle
 from er_il.kinematics.solver import kinematics_of
-from sim_tasks.tasks.object_task import ObjectTask
+from sim_tasks.tasks.object_task import WIDTH, ObjectTask
+from sim_tasks.tasks.rewards import closeness
 from sim_tasks.tasks.serve_coffee_obstacles import BOTTLES, MUG, TOP, ServeCoffeeObstacles
 from sim_tasks.tasks.slide_cup_obstacles import CUP, FALL, MARK, SlideCupObstacles
 
@@ -63,16 +64,20 @@ def test_a_cup_that_falls_off_the_shelf_ends_the_episode(shelf: SlideCupObstacle
     assert play(shelf, [still(shelf)] * 10) == "cup_fell"
 
 
-def test_the_slide_counts_while_the_tip_is_at_the_side_of_the_cup(shelf: SlideCupObstacles) -> None:
+def test_the_slide_counts_as_far_as_the_tip_is_at_the_side_of_the_cup(shelf: SlideCupObstacles) -> None:
     shelf.reset(seed=0, options={"beyond_success": True})
     rows = []
     for action in shelf.leader(0):
         terms = shelf.step(action)[4]["reward_terms"]
-        rows.append((np.linalg.norm(shelf.tip - shelf.push_point), *terms.values()))
-    away, reach, slide, success = np.array(rows).T
+        way = float(np.linalg.norm(shelf.ways[MARK]))
+        rows.append((np.linalg.norm(shelf.ways["beside"]), closeness(way, WIDTH), *terms.values()))
+    away, near, reach, slide, success = np.array(rows).T
+    weights = shelf.reward.weights
     on_the_way = success == 0
-    assert np.all((slide > 0)[on_the_way] == (away < 0.025)[on_the_way])
-    assert np.all((reach == 0.4)[on_the_way] == (away < 0.025)[on_the_way])
+    assert np.all((reach == weights["reach"])[on_the_way] == (away < 0.025)[on_the_way])
+    share = (reach / weights["reach"])[on_the_way]
+    assert share[0] < 0.6 and share[-1] == 1.0
+    assert (slide / weights["slide"])[on_the_way] == pytest.approx(share * near[on_the_way])
     assert np.all(reach + slide + success == 1.0, where=~on_the_way)
 
 

@@ -45,7 +45,7 @@ class SlideCupObstacles(ObjectTask):
     start = (-1.3, -0.54, 0.77, -2.01, 0.83, 2.15, 0.02)  # the hand behind the row, the elbow to the left
     centre = (0.61, -0.06)  # x, y [m] of the middle of the cup's places
     distance = 0.17  # [m] between cup and mark on average
-    reward = Reward(reach=0.4, slide=0.4, success=0.2)
+    reward = Reward(reach=0.0625, slide=0.5625, success=0.375)
 
     def __init__(
         self, *, cup_range: tuple[float, float] = (0.04, 0.04), distance_range: float = 0.02, **kwargs: Any
@@ -113,6 +113,5 @@ class SlideCupObstacles(ObjectTask):
         if self._succeeds():
             return {"reach": 1.0, "slide": 1.0}
         gap = float(np.linalg.norm(self.tip - self.push_point))
-        if gap > TOUCH:
-            return {"reach": closeness(gap, WIDTH), "slide": 0.0}
-        return {"reach": 1.0, "slide": closeness(float(np.linalg.norm(self._way())), WIDTH)}
+        reach = closeness(max(gap - TOUCH, 0.0), WIDTH)
+        return {"reach": reach, "slide": reach * closeness(float(np.linalg.norm(self._way())), WIDTH)}
