@@ -31,7 +31,7 @@ def main() -> None:
             file.write(f"{began},{time.perf_counter()}\n")
             return sent
 
-        FrankaFollower.get_observation, FrankaFollower.send_action = observe_at, send_at  # pyright: ignore
+        FrankaFollower.get_observation, FrankaFollower.send_action = observe_at, send_at
         sys.argv = sys.argv[2:]
         importlib.import_module(f"lerobot.scripts.{command.replace('-', '_')}").main()
 

@@ -70,7 +70,7 @@ def _texts(figure: Figure) -> Iterator[Text]:
                 if not axis.axison or not low <= tick.get_loc() <= high:
                     hidden |= {tick.label1, tick.label2}
         if not axis.axison:
-            hidden |= set(axis.findobj(Text))  # pyright: ignore[reportArgumentType]
+            hidden |= set(axis.findobj(Text))
     for text in figure.findobj(Text):
         if isinstance(text, Text) and text not in hidden and text.get_visible() and text.get_text().strip():
             yield text

@@ -221,7 +221,7 @@ def test_its_interval_draws_trainings_task_by_task() -> None:
 
 
 def lines(axis: Axes) -> list[list[float]]:
-    return [list(map(float, line.get_ydata())) for line in axis.get_lines()]  # pyright: ignore[reportArgumentType]
+    return [list(map(float, line.get_ydata())) for line in axis.get_lines()]
 
 
 def test_curves_show_every_seed_and_the_mean() -> None:
@@ -240,4 +240,4 @@ def test_curves_show_every_seed_and_the_mean() -> None:
     axis = suite_figure([{"decoder": "erj", "iqm": 0.5, "interval": [0.4, 0.7]}]).axes[0]
     assert [tick.get_text() for tick in axis.get_yticklabels()] == ["ERJ"]
     bar = axis.patches[0]
-    assert (bar.get_x(), bar.get_width()) == pytest.approx((40, 30))  # pyright: ignore[reportAttributeAccessIssue]
+    assert (bar.get_x(), bar.get_width()) == pytest.approx((40, 30))

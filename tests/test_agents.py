@@ -45,7 +45,7 @@ STEPS = 128
 
 
 def training(out: Path, **changes: object) -> AgentTraining:
-    return replace(AgentTraining(TASK, MODE, STEPS, 0, SMALL, out), **changes)  # pyright: ignore[reportArgumentType]
+    return replace(AgentTraining(TASK, MODE, STEPS, 0, SMALL, out), **changes)
 
 
 def weights(of: AgentTraining) -> dict[str, torch.Tensor]:
@@ -281,8 +281,8 @@ def test_an_agents_rollouts_become_datasets_and_these_policies(
     commands = read_episodes(out / "joint")[0].leader
     world = make_rl_env(TASK, MODE).world  # commanded as recorded, the arm does it again
     seed = read_episodes(out / "joint")[0].seed
-    world.reset(seed=seed, options={"beyond_success": True})  # pyright: ignore[reportAttributeAccessIssue]
-    ends = [world.step(command)[4]["is_success"] for command in commands]  # pyright: ignore[reportAttributeAccessIssue]
+    world.reset(seed=seed, options={"beyond_success": True})
+    ends = [world.step(command)[4]["is_success"] for command in commands]
     assert ends[-1]
     with pytest.raises(PolicyError, match="task reach_target, not stack_wine"):
         demonstrator.recipe(Recipe.load("stack_wine"))

@@ -67,7 +67,7 @@ def test_the_figure_shows_the_arm_after_each_lap_and_the_drift():
     by_lerobot, by_erj, chart = figure.axes
     drives = {drive["solver"]: drive for drive in report["drives"]}
     for axis, solver in ((by_lerobot, "lerobot"), (by_erj, "erj")):
-        lines = [np.array(line.get_data_3d()).T for line in axis.lines]  # pyright: ignore[reportAttributeAccessIssue]
+        lines = [np.array(line.get_data_3d()).T for line in axis.lines]
         arms = [line for line in lines if len(line) == PANDA.dof + 2]
         np.testing.assert_allclose(arms, drives[solver]["links"])
         elbows = [line[0] for line in lines if len(line) == 1]

@@ -72,7 +72,7 @@ def test_encoded_actions_move_the_arm_as_joint_targets_do():
     encoded = make_action_space_env(REACH, DECODERS["erj"])
     plain.reset(seed=3)
     encoded.reset(seed=3)
-    start = plain.unwrapped.joint_positions  # pyright: ignore[reportAttributeAccessIssue]
+    start = plain.unwrapped.joint_positions
     for step in range(1, 15):
         q = start + 0.01 * step * np.array([-1, 1, 0.5, 0.5, 0, 0, 0.5])
         plain.step(np.append(q, 0.5).astype(np.float32))
@@ -80,8 +80,8 @@ def test_encoded_actions_move_the_arm_as_joint_targets_do():
         assert info["decode_status"] == "ok"
         assert info["joint_step"] == pytest.approx(0.01, abs=2e-3)
     np.testing.assert_allclose(
-        encoded.unwrapped.joint_positions,  # pyright: ignore[reportAttributeAccessIssue]
-        plain.unwrapped.joint_positions,  # pyright: ignore[reportAttributeAccessIssue]
+        encoded.unwrapped.joint_positions,
+        plain.unwrapped.joint_positions,
         atol=2e-3,
     )
 
@@ -92,7 +92,7 @@ def test_a_reset_forgets_the_last_episode():
     env.step(np.full(8, np.nan, dtype=np.float32))
     second, _ = env.reset(seed=5)
     np.testing.assert_array_equal(first["agent_pos"], second["agent_pos"])
-    q = env.unwrapped.joint_positions  # pyright: ignore[reportAttributeAccessIssue]
+    q = env.unwrapped.joint_positions
     _, _, terminated, _, info = env.step(np.append(env.space.encode(q), 1.0).astype(np.float32))
     assert not terminated
     assert info["decode_status"] == "ok"
@@ -110,8 +110,8 @@ def test_stop_ends_the_episode_as_an_invalid_action():
 def test_the_arm_keeps_still_while_actions_mean_nothing(on_invalid: str):
     env = make_action_space_env(REACH, DECODERS["erj"], on_invalid=on_invalid)
     env.reset(seed=0)
-    start = env.unwrapped.joint_positions  # pyright: ignore[reportAttributeAccessIssue]
+    start = env.unwrapped.joint_positions
     for _ in range(10):
         _, _, terminated, _, info = env.step(np.full(9, np.nan, dtype=np.float32))
         assert info["decode_status"] == "invalid" and not terminated
-    np.testing.assert_allclose(env.unwrapped.joint_positions, start, atol=5e-3)  # pyright: ignore[reportAttributeAccessIssue]
+    np.testing.assert_allclose(env.unwrapped.joint_positions, start, atol=5e-3)

@@ -51,7 +51,7 @@ def sim(**options: Any) -> SimFollowerConfig:
 
 
 def robot(inner: RobotConfig | None = None, **options: Any) -> DecodingRobot:
-    built = make_robot_from_config(DecodingRobotConfig(inner=inner or sim(), **options))  # pyright: ignore
+    built = make_robot_from_config(DecodingRobotConfig(inner=inner or sim(), **options))
     assert isinstance(built, DecodingRobot)
     return built
 
@@ -67,7 +67,7 @@ def demonstration(seed: int) -> np.ndarray:
     """The joints [rad] and the gripper (T, 8) of the scripted leader."""
     env = gymnasium.make(task_id("reach_cup"))
     env.reset(seed=seed)
-    return np.array(list(env.unwrapped.leader(seed)))  # pyright: ignore[reportAttributeAccessIssue]
+    return np.array(list(env.unwrapped.leader(seed)))
 
 
 def in_degrees(vectors: np.ndarray) -> np.ndarray:
@@ -94,7 +94,7 @@ def from_attach(actions: np.ndarray, layout: Layout) -> np.ndarray:
     for action in actions:
         state = torch.tensor([[follower.get_observation()[name] for name in names]])
         step.relative_step = type("Kept", (), {"get_cached_state": lambda self, state=state: state})()
-        (decoded,) = step({"action": torch.from_numpy(action)[None]})["action"]  # pyright: ignore
+        (decoded,) = step({"action": torch.from_numpy(action)[None]})["action"]
         told.append(decoded.numpy())
         follower.send_action(dict(zip(NAMES, decoded.tolist(), strict=True)))
     follower.disconnect()
@@ -254,7 +254,7 @@ def test_the_options_of_the_inner_robot_nest():
     options = ["--robot.type=er_il_arm", "--robot.inner.type=er_il_sim", "--robot.inner.task=push_button_elbow"]
     options += ["--robot.inner.camera_names=[]", "--robot.spec=somewhere", "--robot.on_invalid=stop"]
     parsed = draccus.parse(Command, args=options).robot
-    assert parsed == DecodingRobotConfig(inner=sim(task="push_button_elbow"), spec="somewhere", on_invalid="stop")  # pyright: ignore
+    assert parsed == DecodingRobotConfig(inner=sim(task="push_button_elbow"), spec="somewhere", on_invalid="stop")
     with pytest.raises(SystemExit):  # it holds no other of its kind
         draccus.parse(Command, args=["--robot.type=er_il_arm", "--robot.inner.type=er_il_arm"])
 

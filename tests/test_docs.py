@@ -217,7 +217,7 @@ def parse(command: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
         return stopped
 
     def parsed(*args: object, **kwargs: object) -> None:
-        draccus_parse(*args, **kwargs)  # pyright: ignore[reportArgumentType]
+        draccus_parse(*args, **kwargs)
         raise ParsedError
 
     draccus_parse, find = draccus.parse, er_il.cli._command

@@ -126,8 +126,8 @@ def box(monkeypatch: pytest.MonkeyPatch) -> FakeRobot:
     """The one control box in the network."""
     robot = FakeRobot()
     library = ModuleType("franka")
-    library.FrankaError, library.ControlException = FrankaError, ControlException  # pyright: ignore
-    library.Robot = lambda address: robot  # pyright: ignore
+    library.FrankaError, library.ControlException = FrankaError, ControlException
+    library.Robot = lambda address: robot
     monkeypatch.setitem(sys.modules, "franka", library)
     monkeypatch.setattr(sys, "excepthook", sys.excepthook)  # what connecting does to it is undone
     return robot
@@ -156,9 +156,9 @@ def test_the_fr3_is_a_panda_with_other_limits():
 
 
 def test_lerobot_makes_both_devices_by_their_types(box: FakeRobot):
-    config = RobotConfig.get_choice_class("er_il_franka")(address="fake")  # pyright: ignore
+    config = RobotConfig.get_choice_class("er_il_franka")(address="fake")
     robot = make_robot_from_config(config)
-    leader = make_teleoperator_from_config(TeleoperatorConfig.get_choice_class("er_il_franka_leader")(address="fake"))  # pyright: ignore
+    leader = make_teleoperator_from_config(TeleoperatorConfig.get_choice_class("er_il_franka_leader")(address="fake"))
     assert isinstance(robot, FrankaFollower) and isinstance(leader, FrankaLeader)
     assert list(robot.action_features) == list(robot.observation_features) == list(leader.action_features) == NAMES
     bare = FrankaFollower(FrankaFollowerConfig(address="fake", gripper=False))

@@ -50,7 +50,7 @@ def run(main: object, *arguments: str) -> None:
     """Run a command in this process."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "argv", ["command", *arguments])
-        main()  # pyright: ignore[reportCallIssue]
+        main()
 
 
 def send(robot: FrankaFollower, q: np.ndarray, seconds: float) -> None:

@@ -74,7 +74,7 @@ def test_gymnasium_ids_make_the_same_environments() -> None:
 def test_a_decision_takes_a_tenth_of_a_second_in_every_mode(mode: str) -> None:
     env = make_rl_env("reach_target", mode)
     env.reset(seed=0)
-    data = env.world.data  # pyright: ignore[reportAttributeAccessIssue]
+    data = env.world.data
     start = data.time
     steps = 7
     for _ in range(steps):
@@ -88,7 +88,7 @@ def test_ones_are_the_papers_step_sizes() -> None:
     for mode, change in changes.items():
         env = make_rl_env("reach_target", mode, start_range=0.0)
         env.reset(seed=0)
-        before, hand = env.world.joint_positions, env.world.ee_pose[:3, 3].copy()  # pyright: ignore[reportAttributeAccessIssue]
+        before, hand = env.world.joint_positions, env.world.ee_pose[:3, 3].copy()
         action = np.zeros(env.action_space.shape, np.float32)
         action[2] = 7.0  # beyond the Box: clipped
         _, _, _, _, info = env.step(action)
@@ -96,7 +96,7 @@ def test_ones_are_the_papers_step_sizes() -> None:
         if mode == "joint":
             assert moved == pytest.approx(change * np.eye(7)[2], abs=1e-6)
         else:
-            assert env.world.ee_pose[:3, 3] - hand == pytest.approx([0, 0, change], abs=0.01)  # pyright: ignore[reportAttributeAccessIssue]
+            assert env.world.ee_pose[:3, 3] - hand == pytest.approx([0, 0, change], abs=0.01)
 
 
 def test_the_state_tells_the_lag_the_velocities_and_where_things_are_from_the_hand() -> None:
@@ -104,7 +104,7 @@ def test_the_state_tells_the_lag_the_velocities_and_where_things_are_from_the_ha
     state, _ = env.reset(seed=1)
     assert state[names(env, "ee.")][:3] + state[names(env, "ball.d")] == pytest.approx(
         env.world.object_pose("ball")[:3],
-        abs=1e-5,  # pyright: ignore[reportAttributeAccessIssue]
+        abs=1e-5,
     )
     assert np.all(state[names(env, "panda_joint1.left")] == 0) and state[names(env, "grasped")] == 0
     action = np.zeros(8, np.float32)
@@ -151,7 +151,7 @@ def test_ten_successes_in_a_row_truncate_and_success_is_no_end() -> None:
     env.reset(seed=0)
     ends, rewards = [], []
     for _ in range(100):
-        way = env.world.object_pose("ball")[:3] - env.world.ee_pose[:3, 3]  # pyright: ignore[reportAttributeAccessIssue]
+        way = env.world.object_pose("ball")[:3] - env.world.ee_pose[:3, 3]
         action = np.append(np.append(np.clip(way / BOUNDS.position, -1, 1), np.zeros(3)), 1.0).astype(np.float32)
         _, reward, terminated, truncated, info = env.step(action)
         assert not terminated
@@ -235,7 +235,7 @@ def test_what_is_wrong_is_told() -> None:
     with pytest.raises(ShapeError, match=r"The action has shape \(7,\), expected \(8,\)"):
         env.step(np.zeros(7, np.float32))
     with pytest.raises(NumbersError):
-        env.step("left")  # pyright: ignore[reportArgumentType]
+        env.step("left")
 
 
 def test_imitation_tasks_are_learnable_too() -> None:
@@ -249,7 +249,7 @@ def test_imitation_tasks_are_learnable_too() -> None:
 def test_the_papers_pace_waits_until_the_arm_has_settled(mode: str, longest: float) -> None:
     env = make_rl_env("reach_target", mode, pace="settled", anchor="measured")
     env.reset(seed=0)
-    data, action = env.world.data, np.zeros(env.action_space.shape, np.float32)  # pyright: ignore[reportAttributeAccessIssue]
+    data, action = env.world.data, np.zeros(env.action_space.shape, np.float32)
     action[:3] = 1.0
     start = data.time
     _, _, _, _, info = env.step(action)
@@ -288,10 +288,10 @@ def test_a_command_does_not_wind_up_against_the_bench() -> None:
         lead = np.abs(env._env.last_command - env.world.joint_positions).max()
         command = env.step(down)[4]["command"]
         assert np.abs(command - env.world.joint_positions).max() < LEAD + 0.3  # it, and one more change
-    assert lead > LEAD / 2 and env.world.tip[2] < 0.03  # pyright: ignore[reportAttributeAccessIssue]  it presses
-    height = env.world.tip[2]  # pyright: ignore[reportAttributeAccessIssue]
+    assert lead > LEAD / 2 and env.world.tip[2] < 0.03  # it presses
+    height = env.world.tip[2]
     env.step(up), env.step(up), env.step(up)
-    assert env.world.tip[2] > height + 0.03  # pyright: ignore[reportAttributeAccessIssue]  and rises at once
+    assert env.world.tip[2] > height + 0.03  # and rises at once
 
 
 def test_an_episode_has_at_most_as_many_decisions_at_the_papers_pace() -> None:

@@ -47,7 +47,7 @@ def test_the_action_is_the_spaces(space: str, rotation: str, dim: int):
 )
 def test_wrong_options_name_the_right_ones(options: dict[str, str], choices: str):
     with pytest.raises(UnknownNameError, match=choices):
-        ErIlEnvConfig(**options)  # pyright: ignore[reportArgumentType]
+        ErIlEnvConfig(**options)
 
 
 def test_films_have_the_size_that_was_asked_for():

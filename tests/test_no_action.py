@@ -114,7 +114,7 @@ def test_numbers_far_beyond_the_limits_never_reach_the_servos(env: gymnasium.Env
 def test_an_encoded_action_without_measure_is_limited_like_any_other(encoded: ActionSpaceEnv, value: float) -> None:
     encoded.reset(seed=0)
     start = encoded.world.joint_positions
-    *_, info = encoded.step(np.full(9, value))  # pyright: ignore[reportArgumentType]
+    *_, info = encoded.step(np.full(9, value))
     assert info["decode_status"] != "ok"
     reach = encoded.space.arm.velocity / encoded.metadata["render_fps"]
     assert np.all(np.abs(info["command"] - start) <= reach + 1e-9)
@@ -128,7 +128,7 @@ def test_a_step_before_the_first_reset_is_refused() -> None:
         (ErIlEnvConfig(task="lift_cup", action_space="joint").create_envs(2)["er_il"][0], np.stack([GOOD, GOOD])),
     ):
         with pytest.raises(ValueError, match="call reset first"):
-            env.step(action)  # pyright: ignore[reportArgumentType]
+            env.step(action)
         env.close()
 
 
@@ -136,11 +136,11 @@ def test_a_step_before_the_first_reset_is_refused() -> None:
 def test_environments_side_by_side_move_all_or_none(count: int) -> None:
     vector = ErIlEnvConfig(task="lift_cup", action_space="joint").create_envs(count)["er_il"][0]
     vector.reset(seed=0)
-    before = [state(world.unwrapped) for world in vector.get_attr("world")]  # pyright: ignore[reportAttributeAccessIssue]
+    before = [state(world.unwrapped) for world in vector.get_attr("world")]
     for bad in (None, "up", np.tile(GOOD, (count - 1, 1)), np.tile(GOOD, (count + 1, 1)), GOOD, [GOOD, GOOD[:-1]]):
         with pytest.raises(ValueError, match=rf"^The batch of actions .* expected \({count}, 8\)"):
             vector.step(bad)
-    assert all(map(np.array_equal, before, (state(world) for world in vector.get_attr("world"))))  # pyright: ignore[reportAttributeAccessIssue]
+    assert all(map(np.array_equal, before, (state(world) for world in vector.get_attr("world"))))
     vector.close()
 
 
@@ -198,5 +198,5 @@ def test_an_encoded_episode_that_has_ended_repeats_its_last_answer(encoded: Acti
     assert again[1:4] == (0.0, True, False) and again[4]["failure"] == ended[4]["failure"] == "invalid_action"
     assert len(stopping.tally.latencies) == 1
     with pytest.raises(ValueError, match="expected"):
-        stopping.step(None)  # pyright: ignore[reportArgumentType]
+        stopping.step(None)
     stopping.close()

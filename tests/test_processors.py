@@ -174,7 +174,7 @@ def test_stock_record_takes_erj_actions_and_moves_the_joints(tmp_path: Path, mon
     arguments += ["--dataset.push_to_hub=false", "--play_sounds=false"]
     monkeypatch.setattr(sys, "argv", ["record", *arguments])
     with right_arrow_after(100):
-        lerobot_record.record(teleop_action_processor=pipeline(EncodeStep()), robot_action_processor=again)  # pyright: ignore[reportCallIssue]
+        lerobot_record.record(teleop_action_processor=pipeline(EncodeStep()), robot_action_processor=again)
     dataset = LeRobotDataset("me/erj", root=root)
     assert dataset.features["action"]["names"] == list(LAYOUT.encoded_names)
     rows = dataset.hf_dataset.with_format("numpy")[:]

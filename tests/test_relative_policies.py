@@ -55,7 +55,7 @@ def run(main: object, *arguments: str) -> None:
     """Run a command in this process."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "argv", ["command", *arguments])
-        main()  # pyright: ignore[reportCallIssue]
+        main()
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +93,7 @@ def test_every_action_of_a_chunk_counts_from_the_state_at_its_start() -> None:
     chunk = CONVERT.relative(LAYOUT.encode(random_states(9))[None], states[:1])  # far from zero
     starts = [0, 0, 0, 0, 4, 4, 6, 6, 6]  # a policy's queue is refilled, or was reset, at steps 0, 4 and 6
     for now, start in enumerate(starts):
-        relative_step({"observation": {STATE: torch.tensor(states[now : now + 1])}})  # pyright: ignore[reportArgumentType]
+        relative_step({"observation": {STATE: torch.tensor(states[now : now + 1])}})
         if now == start:
             network(torch.zeros(1, 1))
         action = post(torch.tensor(chunk[:, now]))
@@ -108,14 +108,14 @@ def test_without_a_prediction_there_is_no_action() -> None:
     relative_step, absolute_step = steps()
     state = {"observation": {STATE: torch.tensor(random_states(1))}}
     action: Any = {"action": torch.zeros(1, len(LAYOUT.encoded_names))}
-    relative_step(state)  # pyright: ignore[reportArgumentType]
+    relative_step(state)
     with pytest.raises(PolicyError, match="no network was seen to run"):
         absolute_step(action)
-    relative_step(state)  # pyright: ignore[reportArgumentType]
+    relative_step(state)
     torch.nn.Identity()(torch.zeros(1))
     for _ in range(CHUNK):
         absolute_step(action)
-        relative_step(state)  # pyright: ignore[reportArgumentType]
+        relative_step(state)
     with pytest.raises(PolicyError, match=r"torch\.compile"):
         absolute_step(action)  # no policy of this dataset has chunks of so many actions
     with pytest.raises(PolicyError, match=f"lacks {RELATIVE_ACTIONS}"):
@@ -175,7 +175,7 @@ def test_vision_language_action_policies_get_the_steps(
 def config_of(root: Path, **changes: Any) -> ACTConfig:
     settings: dict[str, Any] = {"chunk_size": CHUNK, "n_action_steps": 5} | changes
     config = ACTConfig(device="cpu", **settings)
-    config._runtime_dataset_meta = LeRobotDatasetMetadata("me/rel", root=root)  # pyright: ignore[reportAttributeAccessIssue]
+    config._runtime_dataset_meta = LeRobotDatasetMetadata("me/rel", root=root)
     return config
 
 
@@ -188,7 +188,7 @@ def test_settings_that_cannot_act_chunk_relative_are_refused(dataset: Path, reac
     with pytest.raises(PolicyError, match=r"--policy\.temporal_ensemble_coeff=null"):
         make_pre_post_processors(config_of(dataset, n_action_steps=1, temporal_ensemble_coeff=0.01))
     with pytest.raises(PolicyError, match="Policies of the type xvla normalise actions in their own way"):
-        insert_steps("xvla", pre, SimpleNamespace(steps=[]), LAYOUT.spec(), LAYOUT.names)  # pyright: ignore[reportArgumentType]
+        insert_steps("xvla", pre, SimpleNamespace(steps=[]), LAYOUT.spec(), LAYOUT.names)
     plain = config_of(reach_cup / "erj", n_action_steps=1, temporal_ensemble_coeff=0.01)
     assert not any(isinstance(step, RelativeActionsStep) for step in make_pre_post_processors(plain)[0].steps)
 
@@ -226,7 +226,7 @@ def test_the_steps_are_saved_and_loaded_by_lerobot_itself(trained: Path) -> None
     config = ACTConfig.from_pretrained(trained)
     pre, post = chunk_pipelines._STOCK(config, pretrained_path=str(trained))
     assert the_step(post, AbsoluteActionsStep).relative_step is the_step(pre, RelativeActionsStep)
-    config.n_action_steps, config.temporal_ensemble_coeff = 1, 0.01  # pyright: ignore[reportAttributeAccessIssue]
+    config.n_action_steps, config.temporal_ensemble_coeff = 1, 0.01
     assert factory.make_pre_post_processors is make_pre_post_processors
     with pytest.raises(PolicyError, match="averages actions of several chunks"):
         factory.make_pre_post_processors(config, pretrained_path=str(trained))
@@ -243,7 +243,7 @@ def leader_actions(seed: int) -> np.ndarray:
     """The demonstration (T, 9) of a seed's world in ERJ."""
     env = gymnasium.make(task_id("reach_cup"))
     env.reset(seed=seed)
-    return LAYOUT.encode(np.array(list(env.unwrapped.leader(seed))))  # pyright: ignore[reportAttributeAccessIssue]
+    return LAYOUT.encode(np.array(list(env.unwrapped.leader(seed))))
 
 
 @pytest.fixture

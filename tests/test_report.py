@@ -107,9 +107,9 @@ def test_bars_are_what_was_counted_with_their_intervals() -> None:
 def test_bars_of_a_task_stand_beside_each_other_in_the_colours_of_their_decoders() -> None:
     cells = [{**cell, "task": task} for task in ("reach_cup", "a_task_of_ones_own") for cell in CELLS]
     (axis,) = success_figure(cells).axes
-    places = [[bar.get_x() + bar.get_width() / 2 for bar in each.patches] for each in axis.containers[::2]]  # pyright: ignore
+    places = [[bar.get_x() + bar.get_width() / 2 for bar in each.patches] for each in axis.containers[::2]]
     assert places == [pytest.approx([-0.2, 0.8]), pytest.approx([0.2, 1.2])]
-    colours = [each.patches[0].get_facecolor() for each in axis.containers[::2]]  # pyright: ignore
+    colours = [each.patches[0].get_facecolor() for each in axis.containers[::2]]
     assert len(set(colours)) == 2
     looks = looks_of(["joint", "erj@panda_joint2", "erj@panda_joint3"])
     assert [look.colour for look in looks.values()] == [LOOKS["joint"].colour, *OTHERS[:2]]
@@ -237,7 +237,7 @@ def test_an_animation_plays_films_side_by_side_and_marks_how_each_ends(tmp_path:
     greys, borders, times = [], [], []
     with Image.open(tmp_path / "all.webp") as animation:
         width, height = animation.size
-        for at in range(animation.n_frames):  # pyright: ignore[reportAttributeAccessIssue]
+        for at in range(animation.n_frames):
             animation.seek(at)
             picture = np.asarray(animation.convert("RGB")).astype(int)
             times.append(animation.info["duration"])
@@ -265,7 +265,7 @@ def test_a_strip_shows_every_film_from_its_first_to_its_last_picture(tmp_path: P
     for panel, line in zip(panels, (figure.axes[:4], figure.axes[4:]), strict=True):
         assert line[0].get_title(loc="left") == panel.title
         assert line[-1].get_title(loc="right") == panel.outcome
-    outcomes = [axis._right_title for axis in (figure.axes[3], figure.axes[7])]  # pyright: ignore[reportAttributeAccessIssue]
+    outcomes = [axis._right_title for axis in (figure.axes[3], figure.axes[7])]
     assert [title.get_color() for title in outcomes] == [GOOD, BAD]
     write_strip(panels, 4, tmp_path / "strip.png")
     write_strip(panels[:1], 4, tmp_path / "one.png")
@@ -299,7 +299,7 @@ def test_the_figure_of_a_verification_tells_flagged_frames_apart() -> None:
     shown = {str(line.get_label()): np.asarray(line.get_xdata(), dtype=int) for line in errors.lines}
     assert shown["flagged"].tolist() == [17, 18, 19, 37, 38, 39]
     assert sorted([*shown["not flagged"], *shown["flagged"]]) == list(range(40))
-    values = {float(np.asarray(line.get_ydata())[0]) for line in conditioning.lines if len(line.get_xdata()) == 20}  # pyright: ignore
+    values = {float(np.asarray(line.get_ydata())[0]) for line in conditioning.lines if len(line.get_xdata()) == 20}
     assert values == {0.1, 1.1}
     assert figure.get_suptitle() == "a dataset"
     assert_readable(figure)

@@ -97,13 +97,13 @@ def test_a_hand_above_the_cabinet_is_farther_from_the_cup_than_one_in_the_openin
     """The way to the cup leads through the opening: a straight line through the ceiling is none."""
     world = make("sim_tasks/ReachCup-v0")
     world.reset(seed=0)
-    stem = world.grasp_point  # pyright: ignore[reportAttributeAccessIssue]
+    stem = world.grasp_point
     above, opening = stem + np.array([0.0, 0.0, 0.30]), np.array([0.42, 0.0, stem[2]])
-    distances = [world._distance_to_grasp(hand) for hand in (above, opening)]  # pyright: ignore[reportAttributeAccessIssue]
+    distances = [world._distance_to_grasp(hand) for hand in (above, opening)]
     assert np.linalg.norm(above - stem) == pytest.approx(np.linalg.norm(opening - stem), abs=0.02)
     assert distances[0] > 2 * distances[1]
     # Continuous through the opening.
-    near = [world._distance_to_grasp(opening + np.array([dx, 0.05, 0.0])) for dx in (-1e-6, 1e-6)]  # pyright: ignore[reportAttributeAccessIssue]
+    near = [world._distance_to_grasp(opening + np.array([dx, 0.05, 0.0])) for dx in (-1e-6, 1e-6)]
     assert near[0] == pytest.approx(near[1], abs=1e-5)
 
 

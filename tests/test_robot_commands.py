@@ -51,7 +51,7 @@ def run(main: object, *arguments: str) -> None:
     """Run a command in this process."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "argv", ["command", *arguments])
-        main()  # pyright: ignore[reportCallIssue]
+        main()
 
 
 def script(seed: int) -> np.ndarray:
@@ -59,7 +59,7 @@ def script(seed: int) -> np.ndarray:
     env = gymnasium.make(task_id("reach_cup"))
     env.reset(seed=seed)
     world = env.unwrapped
-    return np.array(list(world.leader(seed)))  # pyright: ignore[reportAttributeAccessIssue]
+    return np.array(list(world.leader(seed)))
 
 
 def sent_to_followers(monkeypatch: pytest.MonkeyPatch) -> list[np.ndarray]:
@@ -330,7 +330,7 @@ def test_stock_rollout_records_episodes_of_the_trained_policy_in_joint_positions
     assert rollout.num_episodes == 2
     assert rollout.features[ACTION]["names"] == NAMES
     columns = rollout.hf_dataset.with_format("numpy")[:]
-    arm = SimFollower(SimFollowerConfig(camera_names=[]))._env.unwrapped.arm  # pyright: ignore[reportAttributeAccessIssue]
+    arm = SimFollower(SimFollowerConfig(camera_names=[]))._env.unwrapped.arm
     for episode in range(2):
         rows = columns["episode_index"] == episode
         q, measured = np.radians(columns[ACTION][rows][:, :7]), np.radians(columns["observation.state"][rows][:, :7])

@@ -48,13 +48,13 @@ def one_thread() -> Iterator[None]:
 
 def training(datasets: Path, out: Path, **changes: object) -> Training:
     settings = {"space": "erj", "dataset": datasets / "erj", "config": default_config("erj"), "steps": 2} | changes
-    return Training(task="reach_cup", out=out, seed=0, **settings)  # pyright: ignore[reportArgumentType]
+    return Training(task="reach_cup", out=out, seed=0, **settings)
 
 
 def run(monkeypatch: pytest.MonkeyPatch, main: object, *arguments: str) -> None:
     """Run a stock command in this process."""
     monkeypatch.setattr(sys, "argv", ["command", *arguments])
-    main()  # pyright: ignore[reportCallIssue]
+    main()
 
 
 def run_in_memory(monkeypatch: pytest.MonkeyPatch, training: Training) -> None:
@@ -275,7 +275,7 @@ def drawn(state: torch.Tensor, start: int, stop: int) -> list[tuple[list[int], f
     sampler = EpisodeAwareSampler([0], [10], shuffle=True, seed=3)
     torch.set_rng_state(state)
     sampler.load_state_dict(compute_sampler_state(start, 10, 4, 1))
-    loader: Any = Accelerator(cpu=True).prepare(DataLoader(range(10), sampler=sampler, batch_size=4))  # pyright: ignore[reportArgumentType]
+    loader: Any = Accelerator(cpu=True).prepare(DataLoader(range(10), sampler=sampler, batch_size=4))
     batches = islice(cycle_where_it_was(loader), stop - start)
     return [(frames.tolist(), torch.rand(1).item(), torch.get_rng_state()) for frames in batches]
 

@@ -7,7 +7,7 @@ from functools import cached_property, lru_cache
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin  # pyright: ignore[reportMissingImports]
+import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from er_il.arms.presets import PRESETS

@@ -39,7 +39,7 @@ def chain_urdf(name: str, base: str, joints: Sequence[ChainJoint], tool: Tool) -
         element = _joint(robot, joint.name, "revolute" if joint.range else "continuous", parent, joint)
         ET.SubElement(element, "axis", xyz=_text(joint.axis))
         limits = dict(zip(("lower", "upper"), map(str, joint.range or ()), strict=False))
-        ET.SubElement(element, "limit", effort="0", velocity=str(joint.velocity), **limits)
+        ET.SubElement(element, "limit", effort="0", velocity=str(joint.velocity), **limits)  # pyrefly: ignore[bad-argument-type]
         parent = joint.link
     _joint(robot, f"{tool.link}_joint", "fixed", parent, tool)
     return ET.tostring(robot, encoding="unicode")

@@ -35,7 +35,7 @@ def _panda8_xml(panda: ET.Element, packages: Path) -> str:
     # What the third joint is to the first two, the old first joint now is to the new ones.
     first = elements["panda_joint1"]
     _connect(first, PREFIX + "link2", "panda_link1")
-    first.find("origin").attrib.update(elements["panda_joint3"].find("origin").attrib)  # pyright: ignore[reportOptionalMemberAccess]
+    first.find("origin").attrib.update(elements["panda_joint3"].find("origin").attrib)  # pyrefly: ignore[missing-attribute]
     panda.set("name", "panda8")
     panda.extend(new.values())
     name_meshes_in(panda, packages)

@@ -8,7 +8,7 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 from xml.parsers import expat
 
-import pinocchio as pin  # pyright: ignore[reportMissingImports]
+import pinocchio as pin
 
 from er_il.support.atomic_files import write_atomically
 from er_il.support.errors import ArmError

@@ -53,7 +53,7 @@ def column_of(table: pa.Table, name: str, path: Path) -> NDArray[Any]:
     listed = pa.types.is_list(column.type) or pa.types.is_fixed_size_list(column.type)
     flat = column.flatten() if listed else column
     numeric = any(is_kind(flat.type) for is_kind in (pa.types.is_integer, pa.types.is_floating, pa.types.is_boolean))
-    lengths = pc.min_max(pc.list_value_length(column)).as_py() if listed else {"min": 1, "max": 1}  # pyright: ignore[reportAttributeAccessIssue]
+    lengths = pc.min_max(pc.list_value_length(column)).as_py() if listed else {"min": 1, "max": 1}  # pyrefly: ignore[missing-attribute]
     if not numeric or column.null_count or flat.null_count or lengths["min"] != lengths["max"]:
         raise DatasetError(f"{path} is damaged: not every row of its column {name} holds as many numbers.")
     return flat.to_numpy(zero_copy_only=False).reshape(len(table), -1 if len(table) else 1)

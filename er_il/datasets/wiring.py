@@ -89,7 +89,7 @@ class Wiring(Declaration):
             joints=self.urdf_joints or (preset.joints if preset else None),
             redundant=self.redundant or (preset.redundant if preset and not self.urdf_joints else None),
             home=preset.home if preset and not self.urdf_joints else None,
-            angle_frames=frames,
+            angle_frames=frames,  # pyrefly: ignore[bad-argument-type]
         )
 
     def part(self, kind: str, rotation: str, names: Sequence[str], state_names: Sequence[str]) -> Part:

@@ -119,7 +119,7 @@ class LearningEnv(gymnasium.Env[Any, NDArray[np.float32]]):
             **own_limit,
             render_mode=render_mode,
             disable_env_checker=True,  # checks every step of the inner environment
-            **cameras,
+            **cameras,  # pyrefly: ignore[bad-argument-type]
             **settings,
         )
         self.world, self.task = learnable_env(world), task

@@ -46,7 +46,7 @@ def telling_seed(rollouts: pd.DataFrame) -> int:
     in_task_space = rollouts["decoder"].str.startswith("task")
     tells = 2 * (rollouts["success"] != in_task_space)
     tells += in_task_space & rollouts["failure"].str.startswith(COLLISION)
-    return int(tells.groupby(rollouts["seed"]).sum().idxmax())  # pyright: ignore[reportArgumentType]
+    return int(tells.groupby(rollouts["seed"]).sum().idxmax())
 
 
 def show(task: str, of_task: Sequence[Film], folder: Path, with_films: bool) -> None:

@@ -139,7 +139,7 @@ class Train(TrainingJob):
         return Training(task, self.space, dataset, out, config, self.size, self.seed, self.demonstrations)
 
     @property
-    def progress(self) -> int:
+    def progress(self) -> int:  # pyrefly: ignore[bad-override]
         logged = _LOGGED_STEP.findall(self.log.read_text()) if self.log.exists() else []
         return int(float(logged[-1][0]) * (1000 if logged[-1][1] else 1)) if logged else 0
 

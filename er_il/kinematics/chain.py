@@ -71,17 +71,17 @@ class Walk:
 
     def point(self, link: Mounted) -> Components:
         """Origin of a link [m], its components (N,)."""
-        return tuple(self.pose(link)[1])  # pyright: ignore[reportReturnType]
+        return tuple(self.pose(link)[1])
 
     @cached_property
     def axes(self) -> list[Components]:
         """Axis of each joint of the chain."""
-        return [tuple(R[:, 2]) for R, _ in self.frames[1:]]  # pyright: ignore[reportReturnType]
+        return [tuple(R[:, 2]) for R, _ in self.frames[1:]]
 
     @cached_property
     def origins(self) -> list[Components]:
         """Origin of each joint of the chain [m]."""
-        return [tuple(p) for _, p in self.frames[1:]]  # pyright: ignore[reportReturnType]
+        return [tuple(p) for _, p in self.frames[1:]]
 
     def jacobian(self, link: Mounted) -> Any:
         """Geometric Jacobian (6, n, N) of a link: linear rows [m/rad], then angular ones [rad/rad]."""

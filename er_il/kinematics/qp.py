@@ -10,7 +10,7 @@ within the joint limits, over the joints that are not held. D dq = d are the lin
 from collections.abc import Iterable
 
 import numpy as np
-import placo  # pyright: ignore[reportMissingImports]
+import placo
 from numpy.typing import NDArray
 
 from er_il.arms.arm import Arm, Vector

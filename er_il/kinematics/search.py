@@ -13,7 +13,7 @@ import math
 from functools import lru_cache
 
 import numpy as np
-import placo  # pyright: ignore[reportMissingImports]
+import placo
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
@@ -106,7 +106,7 @@ class LocalSearch:
         derivative = program.derivative()
         if miss.equations is not None:
             derivative = np.concatenate([derivative, miss.equations[0].take(program.free, axis=1)])
-        *_, inverse, failed = lapack.dgesv(derivative, _eye(len(derivative)))  # pyright: ignore[reportAttributeAccessIssue]
+        *_, inverse, failed = lapack.dgesv(derivative, _eye(len(derivative)))  # pyrefly: ignore[missing-attribute]
         flat = inverse.T.ravel()
         if failed or (flat @ flat >= FOLD**-2 and np.linalg.svd(derivative, compute_uv=False)[-1] <= FOLD):
             return None

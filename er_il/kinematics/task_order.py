@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import BinaryIO
 
-import placo  # pyright: ignore[reportMissingImports]
+import placo
 
 ATTEMPTS = 1000  # each of at most 24 orders is about as likely: a few milliseconds, as a rule
 STDOUT = 1  # file descriptor

@@ -96,7 +96,7 @@ def _load_config(policy: Path) -> PreTrainedConfig:
         config = PreTrainedConfig.from_pretrained(policy)
     config.pretrained_path = policy
     if hasattr(config, "pretrained_backbone_weights"):
-        config.pretrained_backbone_weights = None  # pyright: ignore[reportAttributeAccessIssue]  the checkpoint has them
+        config.pretrained_backbone_weights = None  # pyrefly: ignore[missing-attribute]  the checkpoint has them
     return config
 
 

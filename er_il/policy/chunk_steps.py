@@ -63,7 +63,7 @@ class RelativeActionsStep(RelativeActionsProcessorStep):
             return transition
         assert isinstance(action, torch.Tensor)
         relative = self.convert.relative(_chunks(action), self._states())
-        return {**transition, TransitionKey.ACTION.value: _like(relative, action)}  # pyright: ignore[reportReturnType]
+        return {**transition, TransitionKey.ACTION.value: _like(relative, action)}  # pyrefly: ignore[bad-typed-dict-key]
 
     @property
     def anchor(self) -> Array:
@@ -130,7 +130,7 @@ class AbsoluteActionsStep(AbsoluteActionsProcessorStep):
                 f"{RELATIVE_ACTIONS}."
             )
         absolute = step.convert.absolute(_chunks(action), step.anchor)
-        return {**transition, TransitionKey.ACTION.value: _like(absolute, action)}  # pyright: ignore[reportReturnType]
+        return {**transition, TransitionKey.ACTION.value: _like(absolute, action)}  # pyrefly: ignore[bad-typed-dict-key]
 
     def get_config(self) -> dict[str, Any]:
         return {}

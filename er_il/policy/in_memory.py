@@ -87,7 +87,7 @@ def main() -> None:
                 keep_in_memory(dataset, max(1, config.num_workers))
         return both
 
-    lerobot_train.make_train_eval_datasets = make_in_memory
+    lerobot_train.make_train_eval_datasets = make_in_memory  # pyrefly: ignore[bad-assignment]
     chunk_pipelines.install()
     safeguards.install()
     mistake = None

@@ -23,7 +23,7 @@ def cycle_where_it_was(loader: DataLoaderShard) -> Iterator[Any]:
     LeRobot puts its sampler where it was, but Accelerate's loader then begins at epoch 0 again. And a loader draws a
     random number when it begins an epoch, which a run that is resumed in the middle of one has drawn already.
     """
-    position = get_sampler(loader).state_dict()  # pyright: ignore[reportOptionalMemberAccess]  LeRobot's own
+    position = get_sampler(loader).state_dict()  # pyrefly: ignore[missing-attribute]  LeRobot's own
     loader.set_epoch(position["epoch"])
     drawn = position["start_index"] > 0 or (position["epoch"] > 0 and loader.persistent_workers)
     batches, state = cycle(loader), get_rng_state()
@@ -73,10 +73,10 @@ def move_last(checkpoint: Path) -> None:
 
 def install() -> None:
     """Put all of this into LeRobot's command, in this process."""
-    lerobot_train.cycle = cycle_where_it_was
+    lerobot_train.cycle = cycle_where_it_was  # pyrefly: ignore[bad-assignment]
     lerobot_train.update_policy = stop_at_nan(lerobot_train.update_policy)
-    lerobot_train.save_checkpoint = save_finite_checkpoint
-    lerobot_train.update_last_checkpoint = move_last
+    lerobot_train.save_checkpoint = save_finite_checkpoint  # pyrefly: ignore[bad-assignment]
+    lerobot_train.update_last_checkpoint = move_last  # pyrefly: ignore[bad-assignment]
 
 
 def _diverged(what: str, step: int) -> PolicyError:

@@ -58,6 +58,6 @@ def _draw_arm(axis: Axes3D, drive: Report, circle: list[list[float]], colours: n
         axis.plot(*elbow[max(0, lap - 1) * lap_poses : lap * lap_poses + 1].T, color=colour, linewidth=1)
     axis.plot(*np.array(circle).T, color=BLUE, linewidth=2)
     axis.set(xlim=(-0.15, 0.65), ylim=(-0.5, 0.3), zlim=(0, 0.8))
-    axis.set_box_aspect((1, 1, 1), zoom=1.3)  # pyright: ignore[reportArgumentType]  its stub says int
+    axis.set_box_aspect((1, 1, 1), zoom=1.3)
     axis.view_init(elev=26, azim=-40)
     axis.set_axis_off()

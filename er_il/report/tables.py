@@ -41,4 +41,4 @@ def joined(names: Sequence[str]) -> str:
 
 
 def _lines(texts: pd.DataFrame) -> list[list[str]]:
-    return [list(texts), *texts.to_numpy().tolist()]
+    return [list(texts), *texts.to_numpy().tolist()]  # pyrefly: ignore[bad-return]

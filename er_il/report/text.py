@@ -25,14 +25,14 @@ _ENVIRONMENT = Environment(
     trim_blocks=True,
     lstrip_blocks=True,
 )
-_ENVIRONMENT.globals |= {"reference": REFERENCE, "exact_interval": exact_interval, "paper": paper}
+_ENVIRONMENT.globals |= {"reference": REFERENCE, "exact_interval": exact_interval, "paper": paper}  # pyrefly: ignore[bad-assignment]
 _ENVIRONMENT.filters |= {
     "percent": lambda value, digits=1: f"{value:.{digits}%}",
     "fixed": lambda value, digits: f"{value:.{digits}f}",
     "scientific": lambda value: f"{value:.0e}",
     "rates": lambda interval, digits=1: " – ".join(f"{bound:.{digits}%}" for bound in interval),
-    "code": lambda names: ", ".join(f"`{name}`" for name in names),
-    "markdown_table": lambda rows: markdown_table(read_rows(rows)),
+    "code": lambda names: ", ".join(f"`{name}`" for name in names),  # pyrefly: ignore[not-iterable]
+    "markdown_table": lambda rows: markdown_table(read_rows(rows)),  # pyrefly: ignore[bad-argument-type]
     "tally": tally,
     "offset": lambda T: offset_text(np.asarray(T)),
 }

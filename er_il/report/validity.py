@@ -47,8 +47,8 @@ def summary(report: Report) -> list[dict[str, Any]]:
     rows = rows.join(counts.filter(like="causes.").div(counts["actions"], axis="index"))
     rows["share"] = counts["invalid"] / counts["actions"]
     rows[["low", "high"]] = [exact_interval(*each) for each in zip(counts["invalid"], counts["actions"], strict=True)]
-    order = pd.MultiIndex.from_product((AROUND, SOLVERS, _spaces(report)), names=rows.index.names)
-    return rows.reindex(order).reset_index().to_dict("records")
+    order = pd.MultiIndex.from_product((AROUND, SOLVERS, _spaces(report)), names=rows.index.names)  # pyrefly: ignore[bad-argument-type]
+    return rows.reindex(order).reset_index().to_dict("records")  # pyrefly: ignore[bad-return]
 
 
 def findings(report: Report) -> list[str]:

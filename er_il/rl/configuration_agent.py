@@ -55,7 +55,7 @@ class AgentConfig(PreTrainedConfig):
     def reward_delta_indices(self) -> None:
         return None
 
-    def get_optimizer_preset(self) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
+    def get_optimizer_preset(self) -> None:  # pyrefly: ignore[bad-override]
         """None: agents learn in their environment, by ``er-il rl train``."""
 
     def get_scheduler_preset(self) -> None:

@@ -23,8 +23,8 @@ _IMAGES = f"{OBS_IMAGES}."
 class AgentPolicy(PreTrainedPolicy):
     """Acts by the means of what its networks would draw; through the controller, if it has one (JAiLeR)."""
 
-    config_class = AgentConfig  # pyright: ignore[reportAssignmentType]
-    name = AGENT  # pyright: ignore[reportAssignmentType]
+    config_class = AgentConfig  # pyrefly: ignore[bad-assignment]
+    name = AGENT  # pyrefly: ignore[bad-assignment]
 
     def __init__(self, config: AgentConfig, **_: Any) -> None:
         """Make the networks, untrained.
@@ -37,7 +37,7 @@ class AgentPolicy(PreTrainedPolicy):
             PolicyError: inputs and outputs are not those of an agent.
         """
         super().__init__(config)
-        self.config: AgentConfig = config
+        self.config: AgentConfig = config  # pyrefly: ignore[bad-override-mutable-attribute]
         config.validate_features()
         assert config.input_features is not None
         state = _vector(len(config.state_names))

@@ -183,7 +183,7 @@ class _Run(BaseCallback):
             self._pause()
             # New episodes, as after an interruption here: whether there was one makes no difference.
             self._seed_starts()
-            self._sac._last_obs = self._environments.reset()  # pyright: ignore[reportAttributeAccessIssue]  no tuple
+            self._sac._last_obs = self._environments.reset()
         for learner in self._learners.values():
             aim(learner, self._training.settings, self.num_timesteps / self._training.steps)
 

@@ -83,7 +83,7 @@ class DecodeRobotAction(_Decoding, RobotActionProcessorStep):
         if missing := [name for name in layout.encoded_names if name not in action]:
             raise ErIlError(f"The action lacks {', '.join(missing)}; it has {', '.join(action)}.")
         encoded = np.array([float(action[name]) for name in layout.encoded_names])
-        measured = np.array([_measured(observation, measured_names(layout)[name]) for name in layout.names])
+        measured = np.array([_measured(observation, measured_names(layout)[name]) for name in layout.names])  # pyrefly: ignore[bad-argument-type]
         vector = self._commander.command(encoded, measured).vector
         others = {name: value for name, value in action.items() if name not in layout.encoded_names}
         return others | dict(zip(layout.names, vector.tolist(), strict=True))
@@ -146,7 +146,7 @@ class DecodePolicyAction(_Decoding, AbsoluteActionsProcessorStep):
             raise ShapeError("The policy's action", tuple(action.shape), f"(1, {dim}): a robot is decoded for alone")
         vectors = np.array(self._decode(rows), dtype=np.float32)
         decoded = torch.from_numpy(vectors).to(action.device).reshape(*action.shape[:-1], -1)
-        return {**transition, TransitionKey.ACTION.value: decoded}  # pyright: ignore[reportReturnType]
+        return {**transition, TransitionKey.ACTION.value: decoded}  # pyrefly: ignore[bad-typed-dict-key]
 
     def _decode(self, rows: Vector) -> list[Vector]:
         state = self._latest_state()

@@ -144,7 +144,7 @@ def _rounded(W: Array) -> Weights:
 
     The first joint that weighs at least half as much as a row's largest is positive, so that similar rows look alike.
     """
-    _, R, order = qr(W, mode="economic", pivoting=True)  # pyright: ignore[reportAssignmentType]
+    _, R, order = qr(W, mode="economic", pivoting=True)
     rows = np.empty_like(W)
     rows[:, order] = R
     first = (np.abs(rows) >= 0.5 * np.abs(rows).max(axis=1, keepdims=True)).argmax(axis=1, keepdims=True)

@@ -118,7 +118,7 @@ def relative_code(rotation: RotationCode) -> RotationCode:
 
 def _present(space: PoseSpace, q: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Poses (B, 4, 4) and redundancy values (B, m) at q (B, n) [rad], and a mask (B,) of those that are finite."""
-    finite: NDArray[np.bool_] = np.all(np.isfinite(q), axis=1)  # pyright: ignore[reportAssignmentType]
+    finite: NDArray[np.bool_] = np.all(np.isfinite(q), axis=1)
     known = np.where(finite[:, None], q, space.arm.home)
     return space.kinematics.fk_batch(known), space.redundancy_along(known), finite
 

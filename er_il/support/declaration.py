@@ -96,7 +96,7 @@ def read_yaml(path: Path, noun: str, error: type[ErIlError]) -> object:
         raise error(f"There is no {noun} {path}.") from cause
     except (yaml.YAMLError, ValueError, RecursionError) as cause:  # ValueError: no UTF-8, no such date
         where = getattr(cause, "problem_mark", None)
-        said = f" (line {where.line + 1}: {cause.problem})" if where and hasattr(cause, "problem") else ""  # pyright: ignore[reportAttributeAccessIssue]
+        said = f" (line {where.line + 1}: {cause.problem})" if where and hasattr(cause, "problem") else ""
         raise error(f"{path} is not valid YAML{said}.") from cause
     if _more_values_than(values, MOST_VALUES):
         raise error(f"{path} holds more than {MOST_VALUES} values: that is no {noun}.")

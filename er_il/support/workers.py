@@ -52,7 +52,7 @@ class LocalExecutor(Executor):
             self._pool = self._new_pool()
             return self._pool.submit(fn, *args, **kwargs)
 
-    def __exit__(self, kind: type[BaseException] | None, *rest: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *rest: object) -> None:  # pyrefly: ignore[bad-override]
         self._pool.shutdown(kill_workers=kind is not None)
 
     def _new_pool(self) -> ProcessPoolExecutor:

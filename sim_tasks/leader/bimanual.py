@@ -107,7 +107,7 @@ class _Line:
         self._T_start = self._kinematics.fk(start)
         before = float(self._redundancy.wrapped(start[None])[0])
         self._angle, self._turn = before, (goal.angle - before + np.pi) % (2 * np.pi) - np.pi
-        way = np.linalg.norm(goal.T_base_ee[:3, 3] - self._T_start[:3, 3])
+        way = float(np.linalg.norm(goal.T_base_ee[:3, 3] - self._T_start[:3, 3]))
         self.steps = max(1, int(np.ceil(max(way / STRAIGHT_STEP, abs(self._turn) / TURN_STEP))))
 
     def waypoints(self, steps: int) -> Iterator[Vector]:

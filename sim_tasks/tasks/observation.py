@@ -25,7 +25,7 @@ class ArmObserver:
         """Observe ``robot``, the ``arm`` compiled into a model; its names begin with the label, if any."""
         self._kinematics, self._robot = kinematics_of(arm), robot
         self._rotation = make_rotation(Quaternion.kind, self._kinematics.fk(arm.home)[:3, :3])
-        self._quaternion = np.zeros(4)
+        self._quaternion: Vector = np.zeros(4)
         prefix = f"{label}_" if label else ""
         self.joint_names = tuple(f"{joint}.pos" for joint in arm.joints)
         self.gripper_name = f"{prefix}gripper"

@@ -48,7 +48,7 @@ class PickUpCup(GraspTask):
         """
         self._cup_range = sides("cup_range", cup_range)
         self._other_range = interval("other_range", other_range, least=LEAST)
-        self._start = np.zeros(3)  # [m] the red cup's place in this episode
+        self._start: Vector = np.zeros(3)  # [m] the red cup's place in this episode
         super().__init__(**kwargs)
 
     def _build(self, spec: mujoco.MjSpec) -> None:

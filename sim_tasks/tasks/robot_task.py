@@ -44,7 +44,7 @@ class RobotTask(gym.Env[dict[str, Any], np.ndarray], ABC):
     goes on, as a real one does, but the verdict stands, and there is no reward, until the next reset.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": RATE}  # pyright: ignore[reportIncompatibleVariableOverride]
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": RATE}  # pyrefly: ignore[bad-override]
 
     task: ClassVar[str]  # name under which the class is registered
     task_description: ClassVar[str]
@@ -95,7 +95,7 @@ class RobotTask(gym.Env[dict[str, Any], np.ndarray], ABC):
         if rate not in RATES:
             raise UnknownNameError("control rate", rate, map(str, RATES))
         self.rate = rate
-        self.metadata = {**self.metadata, "render_fps": rate}  # pyright: ignore[reportIncompatibleVariableOverride, reportAttributeAccessIssue]
+        self.metadata = {**self.metadata, "render_fps": rate}  # pyrefly: ignore[read-only]
         self.max_steps = max_steps or registration(self.task).max_steps * rate // RATE
         self.render_mode = render_mode
         self._start_range = span("start_range", start_range)
@@ -289,7 +289,7 @@ class RobotTask(gym.Env[dict[str, Any], np.ndarray], ABC):
     def _leader(self) -> Demonstrator:
         return leader_class(self.task)(self, **self._leader_settings)
 
-    def render(self) -> np.ndarray | None:  # pyright: ignore[reportIncompatibleMethodOverride]
+    def render(self) -> np.ndarray | None:
         """A picture (H, W, 3) uint8 of the scene for people."""
         return self._cameras.picture(self.data) if self.render_mode == "rgb_array" else None
 

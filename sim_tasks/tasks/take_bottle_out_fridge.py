@@ -58,7 +58,7 @@ class TakeBottleOutFridge(ObjectTask):
         self._spring = float(self._hinge.stiffness[0])
         self._door = {self.model.body(DOOR).id}
         self.mark = np.array(MARK)  # [m] to which the bottle's neck is to come
-        self._place_of_bottle = np.zeros(3)  # [m] in this episode
+        self._place_of_bottle: Vector = np.zeros(3)  # [m] in this episode
         self.opened = False  # the catch holds the door open
 
     def _build(self, spec: mujoco.MjSpec) -> None:

@@ -52,7 +52,7 @@ class TrainAgent(TrainingJob):
         )
 
     @property
-    def progress(self) -> int:
+    def progress(self) -> int:  # pyrefly: ignore[bad-override]
         try:
             return read_milestones(self.path.with_suffix(""))[-1].steps
         except (PolicyError, IndexError):

@@ -68,7 +68,7 @@ def predict(report: Mapping[str, Any], cells: Sequence[Mapping[str, Any]]) -> li
     found = []
     for task, trained in data.groupby("task", sort=False):
         risks = {joined(each["joints"]): each["risk"] for each in report["demos"].get(task, report["workspace"])}
-        rows = trained.drop(columns="task").assign(risk=[risks.get(choice) for choice in trained["joints"]])
+        rows = trained.drop(columns="task").assign(risk=[risks.get(choice) for choice in trained["joints"]])  # pyrefly: ignore[bad-argument-type]
         rows = rows.dropna(subset="risk").drop_duplicates("joints", keep="last")
         if len(rows) < 2:
             continue

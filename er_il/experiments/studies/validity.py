@@ -121,7 +121,12 @@ def _summary(actions: pd.DataFrame, *keys: str) -> list[dict[str, Any]]:
         statuses, count = Counter(part["status"]), len(part)
         causes = {status.value: statuses[status] for status in Status if status is not Status.OK}
         invalid = sum(causes.values())
-        found = {"actions": count, "invalid": invalid, "invalid_rate": invalid / count, "causes": causes}
+        found: dict[str, Any] = {
+            "actions": count,
+            "invalid": invalid,
+            "invalid_rate": invalid / count,
+            "causes": causes,
+        }
         found["interval"] = exact_interval(invalid, count)
         for share in (50, 99):
             found[f"iterations_p{share}"] = float(np.percentile(part["iterations"], share))

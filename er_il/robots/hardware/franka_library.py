@@ -23,7 +23,7 @@ def library() -> Any:
         RobotError: it is not installed.
     """
     try:
-        import franka  # pyright: ignore[reportMissingImports]
+        import franka
     except ImportError as error:
         raise RobotError(
             "Franka arms need the package franka-rs: install er_il with its extra `franka`, as in "
