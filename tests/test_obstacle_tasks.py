@@ -6,10 +6,9 @@ from playing import play
 
 from er_il.kinematics.redundancy import JointAngle
 from er_il.kinematics.solver import kinematics_of
-from sim_tasks.tasks.object_task import WIDTH, ObjectTask
-from sim_tasks.tasks.rewards import closeness
+from sim_tasks.tasks.object_task import ObjectTask
 from sim_tasks.tasks.serve_coffee_obstacles import BOTTLES, MUG, TOP, ServeCoffeeObstacles
-from sim_tasks.tasks.slide_cup_obstacles import CUP, FALL, MARK, SlideCupObstacles
+from sim_tasks.tasks.slide_cup_obstacles import CUP, FALL, FAR, MARK, SlideCupObstacles
 
 LEANING = (np.cos(0.4), np.sin(0.4), 0.0, 0.0)  # quaternion of a turn by 0.8 rad about x
 STRAIGHT = (1.0, 0.0, 0.0, 0.0)
@@ -70,7 +69,7 @@ def test_the_slide_counts_as_far_as_the_tip_is_at_the_side_of_the_cup(shelf: Sli
     for action in shelf.leader(0):
         terms = shelf.step(action)[4]["reward_terms"]
         way = float(np.linalg.norm(shelf.ways[MARK]))
-        rows.append((np.linalg.norm(shelf.ways["beside"]), closeness(way, WIDTH), *terms.values()))
+        rows.append((np.linalg.norm(shelf.ways["beside"]), 1.0 - way / FAR, *terms.values()))
     away, near, reach, slide, success = np.array(rows).T
     weights = shelf.reward.weights
     on_the_way = success == 0

@@ -48,6 +48,11 @@ def closeness(distance: float, width: float) -> float:
     return math.fsum(proximity(distance, width * share) for share in KERNELS) / len(KERNELS)
 
 
+def share(left: float, whole: float) -> float:
+    """Share in [0, 1] of a way that is done: every step of it earns the same. Lengths in [m], or angles in [rad]."""
+    return min(max(1.0 - left / whole, 0.0), 1.0)
+
+
 def way_down(left: Vector) -> float:
     """Length [m] of the way to a place that a thing comes to from above, given the vector to it (3,) [m].
 

@@ -13,7 +13,7 @@ import numpy as np
 from er_il.arms.arm import Vector
 from sim_tasks.tasks.object_task import WIDTH, ObjectTask
 from sim_tasks.tasks.placement import Area, Placement
-from sim_tasks.tasks.rewards import Reward, closeness
+from sim_tasks.tasks.rewards import Reward, closeness, share
 from sim_tasks.world.crockery import teacup
 from sim_tasks.world.fixed import add_fixed
 from sim_tasks.world.props import CYLINDER
@@ -28,6 +28,7 @@ PLACES = (-0.19, -0.08, 0.18, 0.29, 0.40)  # y [m] of the bottles, by 11 cm but 
 BESIDE = 0.058  # [m] beside the cup's middle, where the tip of a closed hand touches the cup's side
 TOUCH = 0.025  # [m] from there, within which the tip counts as there
 HEIGHT = 0.055  # [m] above the shelf at which the hand pushes, its palm above the cup
+FAR = 0.25  # [m] beyond any way to the mark
 PLACED = 0.03  # [m] between the cup and the mark, at most
 STANDS = np.cos(np.radians(15))  # of the tilt of a cup that stands
 FALL = 0.075  # [m] by which the cup falls at a failure
@@ -114,4 +115,4 @@ class SlideCupObstacles(ObjectTask):
             return {"reach": 1.0, "slide": 1.0}
         gap = float(np.linalg.norm(self.tip - self.push_point))
         reach = closeness(max(gap - TOUCH, 0.0), WIDTH)
-        return {"reach": reach, "slide": reach * closeness(float(np.linalg.norm(self._way())), WIDTH)}
+        return {"reach": reach, "slide": reach * share(float(np.linalg.norm(self._way())), FAR)}

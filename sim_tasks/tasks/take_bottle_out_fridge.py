@@ -15,7 +15,7 @@ from er_il.kinematics.redundancy import JointAngle
 from er_il.kinematics.solver import Status, kinematics_of
 from sim_tasks.tasks.object_task import TURN_WIDTH, WIDTH, ObjectTask
 from sim_tasks.tasks.placement import Area, Placement, yawed
-from sim_tasks.tasks.rewards import Reward, closeness
+from sim_tasks.tasks.rewards import Reward, closeness, share
 from sim_tasks.world.contact import touching
 from sim_tasks.world.fridge import Fridge
 from sim_tasks.world.props import SPHERE
@@ -142,14 +142,14 @@ class TakeBottleOutFridge(ObjectTask):
 
     def _pulled(self) -> float:
         """Share of the way straight out of the fridge that the bottle's neck has made, at most 1."""
-        inside, whole = (place - OUTSIDE for place in (self._neck[0], self._place_of_bottle[0]))
-        return 1.0 - max(float(inside / whole), 0.0)
+        inside, whole = (float(place) - OUTSIDE for place in (self._neck[0], self._place_of_bottle[0]))
+        return share(inside, whole)
 
     def _carried(self) -> float:
         """Share of the way on to the mark that it has made, from where it comes out; 0 while it is inside."""
         _, y, z = self._place_of_bottle
-        whole = np.linalg.norm(self.mark - (OUTSIDE, y, z + NECK))
-        return max(1.0 - float(self._distance() / whole), 0.0) if self._pulled() == 1.0 else 0.0
+        whole = float(np.linalg.norm(self.mark - (OUTSIDE, y, z + NECK)))
+        return share(self._distance(), whole) if self._pulled() == 1.0 else 0.0
 
     @property
     def _neck(self) -> Vector:
