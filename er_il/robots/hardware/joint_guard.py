@@ -28,8 +28,8 @@ class JointGuard:
         last = self._anchored()
         if np.all(np.isfinite(wanted)):
             step = np.clip(wanted, self._lower, self._upper) - last
-            share = float(np.max(np.abs(step) / self._velocity)) / passed  # of the way that full speed allows
-            last = self._last = last + step / max(1.0, share)
+            share = np.max(np.abs(step) / self._velocity) / passed  # of the way that full speed allows
+            last = self._last = last + step / max(1.0, float(share))
         return last
 
     def brake(self, q: Vector, rest: Vector) -> Vector:
