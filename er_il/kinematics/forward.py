@@ -209,7 +209,7 @@ class ForwardKinematics:
         lengths = [model.jointPlacements[joint].translation for joint in others]
         lengths.append(model.frames[self._ee].placement.translation)
         centre = self._T_base_world.act(data.oMi[first].translation)
-        return centre, sum(float(np.linalg.norm(length)) for length in lengths)
+        return centre, float(sum(np.linalg.norm(length) for length in lengths))  # pyrefly: ignore[no-matching-overload]
 
     def points(self, q: Vector, frames: tuple[str, ...]) -> "Points":
         """Origins of links in the base frame at q (n,) [rad], and what their derivatives take."""
