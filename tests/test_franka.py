@@ -234,6 +234,13 @@ def test_braking_never_passes_the_last_target():
     np.testing.assert_allclose(guard.brake(np.array([0.05, -0.05]), np.array([0.2, -0.07])), [0.1, -0.07])
 
 
+@pytest.mark.filterwarnings("ignore:divide by zero")
+def test_no_time_allows_no_way():
+    guard = JointGuard(-np.ones(2), np.ones(2), np.ones(2))
+    guard.anchor(np.zeros(2))
+    np.testing.assert_allclose(guard.target(np.array([0.1, -0.1]), 0.0), 0.0)
+
+
 def test_a_reflex_within_an_episode_ends_the_command(follower: FrankaFollower, box: FakeRobot):
     box.abort(ControlException("joint_reflex"))
     with pytest.raises(ReflexError, match=r"joint_reflex.*touched.*Starting again recovers"):
